@@ -1,5 +1,5 @@
-"""What the operator and the scientist do: the program `traction`.
+"""The program `traction`: recording, commissioning, calibration, reports, exports.
 
-`commands` has one file a command, `run` the flow of a session, `session` its state on
-the disk, `rig` the composition root. Begin with `commands.run`.
+`commands` has one module per command, `run` the flow of a session, `session` its state
+on the disk, `rig` the composition root. Begin with `commands.run`.
 """

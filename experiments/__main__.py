@@ -1,5 +1,5 @@
 # PYTHON_ARGCOMPLETE_OK
-"""The command line: parse, run one command, turn errors into messages and codes."""
+"""The command line: parse, run one command, convert errors to messages and codes."""
 
 import argparse
 import errno
@@ -52,7 +52,7 @@ COMMANDS = {
     "identify": "classify the terrain of a trial: probabilities over time",
     "fit": "fit and compare models of external data, npz or CSV",
 }
-_MODULES = {"import": "import_log"}  # where a command has a name that Python keeps
+_MODULES = {"import": "import_log"}  # commands named like Python keywords
 _OF_THE_DISK = {
     errno.EIO,
     errno.ENOSPC,
@@ -94,30 +94,30 @@ _INVALID = re.compile(r"invalid choice: '(?P<got>[^']*)' \(choose from (?P<known
 
 
 class _Parser(argparse.ArgumentParser):
-    """Names the nearest command or choice to one that there is not."""
+    """Suggests the nearest command or choice for an unknown one."""
 
     def error(self, message: str) -> NoReturn:
-        """Print the message with what was probably meant, and end with 2."""
+        """Print the message with a suggestion, and exit with 2."""
         if invalid := _INVALID.search(message):
             known = re.findall(r"[\w-]+", invalid["known"])
             message = f"{message} {did_you_mean(invalid['got'], known)}".rstrip()
         super().error(message)
 
     def print_help(self, file: "SupportsWrite[str] | None" = None) -> None:
-        """Print the help; unlike argparse's own it tells of a disk that is full."""
+        """Print the help; unlike argparse it reports a full disk."""
         print(self.format_help(), end="", file=file)
         sys.stdout.flush()
 
 
 class _Formatter(argparse.RawDescriptionHelpFormatter):
-    """Keeps the examples as they are written."""
+    """Prints the examples verbatim."""
 
 
 def build_parser(wanted: Collection[str] = COMMANDS) -> argparse.ArgumentParser:
     """Return the parser of all commands; imports no slow library.
 
     Args:
-        wanted: commands whose options are declared; the others have only their names.
+        wanted: commands with options; the others have only their names.
     """
     parser = _Parser(
         prog="traction",
@@ -159,7 +159,7 @@ def _show_first_steps(_: argparse.Namespace) -> int:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit code."""
+    """Run one command; returns its exit code."""
     with _ended_as_by_ctrl_c():
         return _main(arguments)
 
@@ -168,12 +168,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _ended_as_by_ctrl_c() -> Generator[None]:
     """End a command at SIGTERM or a closed terminal as at Ctrl-C.
 
-    What it opened is closed, and it says so. A session handles all three itself.
+    Its resources are closed. A session handles all three itself.
     """
     replaced: list[signal.Signals] = []
     for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
-        if signal.getsignal(number) is signal.SIG_DFL:  # not ignored, as by nohup
-            with suppress(ValueError):  # in a thread there are no handlers
+        if signal.getsignal(number) is signal.SIG_DFL:  # unless ignored, as by nohup
+            with suppress(ValueError):  # threads cannot set handlers
                 signal.signal(number, signal.default_int_handler)
                 replaced.append(number)
     try:
@@ -184,7 +184,7 @@ def _ended_as_by_ctrl_c() -> Generator[None]:
 
 
 def _main(arguments: Sequence[str] | None) -> int:
-    if "_ARGCOMPLETE" in os.environ:  # the shell asks, and reads what is printed
+    if "_ARGCOMPLETE" in os.environ:  # completion for the shell, which reads the output
         _complete()
     for name, value in openblas_settings().items():
         os.environ.setdefault(name, value)
@@ -195,7 +195,7 @@ def _main(arguments: Sequence[str] | None) -> int:
     parser = build_parser(set(named) & set(COMMANDS))
     try:
         args = parser.parse_args(named)
-    except OSError as error:  # --version and --help print while they are parsed
+    except OSError as error:  # --version and --help print during parsing
         return _report_output(error)
     try:
         code = args.run(args)
@@ -205,7 +205,7 @@ def _main(arguments: Sequence[str] | None) -> int:
             print(f"cause: {error.__cause__!r}", file=sys.stderr)  # noqa: T201
         return error.exit_code
     except KeyboardInterrupt:
-        return _tell("nothing-lost", {})
+        return _print_message("nothing-lost", {})
     except BrokenPipeError as error:
         return _report_output(error)
     except Exception as error:
@@ -220,7 +220,7 @@ def _main(arguments: Sequence[str] | None) -> int:
 
 
 def _has_folder() -> bool:
-    """Return whether the folder this was started in is still there."""
+    """Return whether the working directory still exists."""
     try:
         Path.cwd()
     except OSError:
@@ -229,7 +229,7 @@ def _has_folder() -> bool:
 
 
 def _report_output(error: OSError) -> int:
-    """Say that a full disk took no output; a reader that has gone is no fault."""
+    """Report an output error; a closed reader is no fault."""
     from experiments.operator.console import OutputError, discard
 
     discard(sys.stdout)
@@ -240,7 +240,7 @@ def _report_output(error: OSError) -> int:
 
 
 def _complete() -> None:
-    """Answer the tab key."""
+    """Complete the command line for the shell."""
     with suppress(ImportError):
         import argcomplete
 
@@ -250,7 +250,7 @@ def _complete() -> None:
 
 
 def _report_disk(error: OSError) -> int:
-    """Say that a disk refused what no command had expected it to."""
+    """Report a disk error that no command has handled."""
     from acquisition.errors import TrialFileError
 
     refusal = TrialFileError(
@@ -263,7 +263,7 @@ def _report_disk(error: OSError) -> int:
 
 
 def _report_bug() -> int:
-    """Write the traceback to a log and say where it is."""
+    """Write the traceback to a log and print its path."""
     import tempfile
     import traceback
 
@@ -271,10 +271,12 @@ def _report_bug() -> int:
         "w", prefix="traction-bug-", suffix=".log", delete=False
     ) as log:
         log.write(traceback.format_exc())
-    return _tell("command-bug", {"error": repr(sys.exc_info()[1]), "log": log.name})
+    return _print_message(
+        "command-bug", {"error": repr(sys.exc_info()[1]), "log": log.name}
+    )
 
 
-def _tell(name: str, details: Mapping[str, object]) -> int:
+def _print_message(name: str, details: Mapping[str, object]) -> int:
     """Print a message of the catalogue and return its exit code."""
     from experiments.messages import CATALOGUE
 

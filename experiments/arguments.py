@@ -1,4 +1,4 @@
-"""Arguments that more than one command takes; imports nothing slow."""
+"""Arguments shared by several commands; imports nothing slow."""
 
 import math
 import shlex
@@ -8,21 +8,21 @@ from pathlib import Path
 from typing import Literal
 
 DEFAULT_DATA = Path("data")
-FRICTION = 0.4  # of the simulated joints, as a share of another arm's; ASSUMED
+FRICTION = 0.4  # share of another arm's friction in simulated joints; ASSUMED
 CABLES = (8.0, 25.0)  # Hz, resonance of joints on cables; ASSUMED
 PACES = ("steady", "slow", "fast", "clumsy")  # of the simulated person
-# How time passes in a simulation: as on the wall, as fast as can be, in processes.
+# Time in a simulation: paced to real time, at full speed, or in processes.
 TimeMode = Literal["paced", "fast", "processes"]
 
 
 def add_global_options(
     parser: ArgumentParser, *, is_after_command: bool = False
 ) -> None:
-    """Declare the options that stand before or after the command; the last one wins.
+    """Declare the options before or after the command; the last one wins.
 
     Args:
-        parser: of the program, or of one command.
-        is_after_command: of a command: what is left out there stays as it stood before.
+        parser: parser of the program, or of one command.
+        is_after_command: parser of a command: omitted options keep their value.
     """
     left_out = SUPPRESS if is_after_command else None
     group = parser.add_argument_group("global options")
@@ -49,10 +49,10 @@ def add_global_options(
 
 
 def whole_number(text: str) -> int:
-    """Return a seed from the command line.
+    """Parse a seed.
 
     Raises:
-        ArgumentTypeError: it is not a whole number of at least 0.
+        ArgumentTypeError: `text` is no whole number of at least 0.
     """
     if not (text.isascii() and text.isdigit() and len(text) <= 18):
         raise ArgumentTypeError(f"{text!r} - expected a whole number >= 0, e.g. 1")
@@ -60,9 +60,9 @@ def whole_number(text: str) -> int:
 
 
 def number_within(least: float, most: float, wanted: str) -> Callable[[str], float]:
-    """Return a reader of numbers from `least` to `most`; `wanted` says what is meant.
+    """Return a parser of numbers from `least` to `most`; `wanted` describes them.
 
-    The reader raises ArgumentTypeError.
+    The parser raises ArgumentTypeError.
     """
 
     def read(text: str) -> float:
@@ -78,7 +78,7 @@ def number_within(least: float, most: float, wanted: str) -> Callable[[str], flo
 
 
 def add_simulated_arm(parser: ArgumentParser) -> None:
-    """Declare which simulated arm it is."""
+    """Declare the options of the simulated arm."""
     parser.add_argument(
         "--seed", type=int, default=1, metavar="N", help="seed of the simulation (1)"
     )
@@ -98,10 +98,10 @@ def add_simulated_arm(parser: ArgumentParser) -> None:
 
 
 def friction_share(args: Namespace) -> float:
-    """Return how much the simulated joints rub, as a share of another arm's.
+    """Return the friction of the simulated joints, as a share of another arm's.
 
     Raises:
-        SettingsError: the number is none that is simulated.
+        SettingsError: the number is out of range.
     """
     from acquisition.errors import SettingsError
 
@@ -117,7 +117,7 @@ def friction_share(args: Namespace) -> float:
 
 
 def add_seed(parser: ArgumentParser) -> None:
-    """Declare the seed of the rows that a Gaussian process is trained on."""
+    """Declare the seed of the training points of Gaussian processes."""
     parser.add_argument(
         "--points-seed",
         dest="seed",
@@ -170,7 +170,7 @@ def add_analysis(parser: ArgumentParser) -> None:
 
 
 def add_covariate(parser: ArgumentParser, columns: str) -> None:
-    """Declare which columns are tested; `columns` says which there are."""
+    """Declare the columns to test; `columns` lists the available ones."""
     parser.add_argument(
         "--covariate",
         metavar="NAME,..",
@@ -179,7 +179,7 @@ def add_covariate(parser: ArgumentParser, columns: str) -> None:
 
 
 def add_table_form(parser: ArgumentParser) -> None:
-    """Declare how tables of other programs are read."""
+    """Declare the options for tables of other programs."""
     group = parser.add_argument_group("tables")
     group.add_argument(
         "--columns",
@@ -225,7 +225,7 @@ def add_table_form(parser: ArgumentParser) -> None:
 
 
 def add_scheduler(parser: ArgumentParser) -> None:
-    """Declare where models are fitted."""
+    """Declare the scheduler of the fits."""
     parser.add_argument(
         "--scheduler",
         metavar="ADDRESS",
@@ -235,14 +235,14 @@ def add_scheduler(parser: ArgumentParser) -> None:
 
 
 def add_pdf(parser: ArgumentParser) -> None:
-    """Declare that figures are wanted as PDF, too."""
+    """Declare the option for figures as PDF."""
     parser.add_argument(
         "--pdf", action="store_true", help="figures as PDF, too; takes seconds more"
     )
 
 
 def add_time(parser: ArgumentParser) -> None:
-    """Declare how time passes in a simulation."""
+    """Declare the mode of time in a simulation."""
     chosen = parser.add_mutually_exclusive_group()
     chosen.add_argument(
         "--fast",
@@ -258,14 +258,14 @@ def add_time(parser: ArgumentParser) -> None:
 
 
 def asked_time(args: Namespace) -> TimeMode | None:
-    """Return how simulated time is asked to pass; None = not said."""
+    """Return the requested mode of simulated time; None = not given."""
     if args.fast:
         return "fast"
     return "processes" if args.processes else None
 
 
 def add_recording(parser: ArgumentParser) -> None:
-    """Declare what every command takes that opens a new session."""
+    """Declare the options of commands that open a new session."""
     parser.add_argument("terrain", metavar="TERRAIN", help="a name in matrix.toml")
     parser.add_argument("--fake", action="store_true", help="simulated devices")
     add_time(parser)
@@ -298,7 +298,7 @@ def add_recording(parser: ArgumentParser) -> None:
 
 
 def add_reopening(parser: ArgumentParser) -> None:
-    """Declare what every command takes that opens a session once more."""
+    """Declare the options of commands that open a session again."""
     parser.add_argument(
         "--fake", action="store_true", help="accept a simulated session only"
     )
@@ -325,7 +325,7 @@ def add_reopening(parser: ArgumentParser) -> None:
 
 
 def add_allow_missing(parser: ArgumentParser) -> None:
-    """Declare that kept trials which are missing or changed stop nothing."""
+    """Declare the option to go on without missing or changed kept trials."""
     parser.add_argument(
         "--allow-missing",
         action="store_true",
@@ -334,7 +334,7 @@ def add_allow_missing(parser: ArgumentParser) -> None:
 
 
 def add_fault(parser: ArgumentParser) -> None:
-    """Declare the faults that a rehearsal raises."""
+    """Declare the faults to inject into a rehearsal."""
     parser.add_argument(
         "--fault",
         action="append",
@@ -345,7 +345,7 @@ def add_fault(parser: ArgumentParser) -> None:
 
 
 def add_port(parser: ArgumentParser, when: str = "") -> None:
-    """Declare where viewers are served; `when` says with which other option."""
+    """Declare the port of viewers; `when` names the option that needs it."""
     parser.add_argument(
         "--port",
         type=number_within(0, 65_535, "a whole number 0..65535, e.g. 8765"),
@@ -356,7 +356,7 @@ def add_port(parser: ArgumentParser, when: str = "") -> None:
 
 
 def add_author(parser: ArgumentParser) -> None:
-    """Declare whose word a note or a verdict is."""
+    """Declare the author of a note or a verdict."""
     parser.add_argument(
         "--operator",
         default="",
@@ -366,15 +366,15 @@ def add_author(parser: ArgumentParser) -> None:
 
 
 def data_option(data: Path) -> str:
-    """Return the option that names `data` in a command to be typed, "" if none."""
+    """Return the option for `data` in a command to type, "" for the default."""
     return "" if str(data) == "data" else f" --data {shlex.quote(str(data))}"
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
-    """Return the known name that was probably meant, None where none is near."""
+    """Return the known name nearest to `name`, None if none is near."""
     from difflib import get_close_matches
 
-    names = {each.lower(): each for each in known}
+    names = {candidate.lower(): candidate for candidate in known}
     near = get_close_matches(name.lower(), names, n=1, cutoff=0.6)
     return names[near[0]] if near else None
 

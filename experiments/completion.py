@@ -1,4 +1,4 @@
-"""What the tab key offers: terrains, sessions, trials, faults, messages, files."""
+"""Shell completion: terrains, sessions, trials, faults, messages, files."""
 
 import argparse
 from collections.abc import Iterable
@@ -11,9 +11,9 @@ from acquisition.errors import TractionError
 
 
 class NameCompleter(BaseCompleter):
-    """Completes an argument by what stands in its place in the help.
+    """Completes an argument by its metavar.
 
-    Whatever cannot be read offers nothing: the shell shows no message.
+    On errors it offers nothing, since the shell shows no messages.
     """
 
     def __call__(
@@ -34,7 +34,7 @@ class NameCompleter(BaseCompleter):
 
 
 def _names(metavar: str, dest: str, args: argparse.Namespace) -> Iterable[str] | None:
-    """Return what may stand there; None = a file."""
+    """Return the permitted names; None = a file."""
     if metavar == "SESSION":
         return _sessions(args)
     if metavar == "TRIAL":
@@ -77,7 +77,7 @@ def _trials(args: argparse.Namespace) -> list[str]:
 
 
 def _faults(args: argparse.Namespace) -> list[str]:
-    """Return what a simulated rig of these settings can be made to do."""
+    """Return the faults that a simulated rig of these settings can have."""
     from experiments.rig.rig import FakeOptions, build_rig
     from experiments.run.host_faults import COMPUTER_FAULTS
     from experiments.settings.load import load_settings

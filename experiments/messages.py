@@ -35,12 +35,12 @@ class Message:
     Attributes:
         what: what happened, with numbers and limits.
         do: what to do.
-        exit_code: of the command, when it ends with this message.
+        exit_code: exit code of a command that ends with this message.
         more: explanation for `traction check --explain`.
-        arm: what the arm is doing now; empty where no arm is involved.
-        example: of a `what` that a driver words; empty where it stands for itself.
-        prompt: the one whose keys `do` names; empty where it names none.
-        blames_hardware: as a refusal it sends people to cables and devices.
+        arm: state of the arm; empty if no arm is involved.
+        example: example of a `what` supplied by a driver; else empty.
+        prompt: prompt whose keys `do` names; else empty.
+        blames_hardware: whether the error suggests a fault of cables or devices.
     """
 
     what: str
@@ -59,7 +59,7 @@ class Message:
         return " ".join(part for part in parts if part)
 
     def sample(self) -> tuple[str, str]:
-        """Return what happened and what to do, numbers and names left open."""
+        """Return `what` and `do` with "…" for numbers and names."""
         do = self.do.replace("{then}", AFTER_FAULT[Prompt.READY])
         do = do.replace("{command}", RESUME)
         return _left_open(self.example or self.what), _left_open(do)
@@ -71,7 +71,7 @@ def _load() -> dict[str, Message]:
 
 
 def _left_open(text: str) -> str:
-    """Return a format string with "…" for everything that is filled in."""
+    """Return a format string with "…" for its fields."""
     parts = Formatter().parse(text)
     return "".join(word + ("…" if name is not None else "") for word, name, *_ in parts)
 
@@ -80,7 +80,7 @@ CATALOGUE: Mapping[str, Message] = _load()
 
 
 def preflight_error(name: str, **fields: object) -> PreflightError:
-    """Return the refusal of a rig that is called `name` in the catalogue."""
+    """Return the preflight error called `name` in the catalogue."""
     message = CATALOGUE[name]
     kind = UnfitDeviceError if message.blames_hardware else PreflightError
     return kind(
@@ -91,10 +91,10 @@ def preflight_error(name: str, **fields: object) -> PreflightError:
 
 
 def weight_words(cause: WeightCause, **fields: object) -> dict[str, str]:
-    """Return what explains a wrong weight of the foot, as fields of a message.
+    """Return fields of a message that explain a wrong weight of the foot.
 
     Args:
-        cause: what explains it.
+        cause: the probable cause.
         fields: foot, mass and `seen` mass [kg], turned [degrees], sign.
     """
     names = ("likely", "question", "remedy")
@@ -103,7 +103,7 @@ def weight_words(cause: WeightCause, **fields: object) -> dict[str, str]:
 
 
 def explanation(name: str) -> list[str]:
-    """Return all there is to say about the message `name`, line by line."""
+    """Return the full explanation of the message `name`, line by line."""
     message = CATALOGUE[name]
     arm = [f"ARM: {message.arm}."] if message.arm else []
     what, do = message.sample()
@@ -112,7 +112,7 @@ def explanation(name: str) -> list[str]:
 
 
 def catalogue_table(names: Sequence[str] = ()) -> list[str]:
-    """Return the catalogue, or these rows of it, as a table in Markdown."""
+    """Return the catalogue, or the rows `names`, as a Markdown table."""
     rows = ["| message | what you read | the arm | what to do |", "|---|---|---|---|"]
     for name in names or sorted(CATALOGUE):
         what, do = CATALOGUE[name].sample()
@@ -120,7 +120,7 @@ def catalogue_table(names: Sequence[str] = ()) -> list[str]:
     return rows
 
 
-# Names of the messages for a fault whose cause is known; else the fault's own.
+# Messages of faults with a known cause; otherwise that of the fault.
 _BY_MONITOR = {Fault.PENDANT_IDLE: "safety-idle", Fault.E_STOP: "safety-stop"}
 _BY_CONDITION = {
     BusCondition.DOWN: "interface-down",
@@ -128,13 +128,13 @@ _BY_CONDITION = {
     BusCondition.OFF: "bus-off",
     BusCondition.UNACKNOWLEDGED: "unacknowledged",
 }
-BUS_WORDS = {  # of a bus on which nothing can be asked
+BUS_WORDS = {  # conditions of a bus without communication
     BusCondition.DOWN: "The CAN interface refuses to send and receive.",
     BusCondition.FULL: "No device on the CAN bus acknowledges: its queue is full.",
     BusCondition.OFF: "The CAN controller has left the bus (bus-off).",
     BusCondition.UNACKNOWLEDGED: "No device on the CAN bus acknowledges.",
 }
-# What explains a weight of the foot that is not as expected; the question; the remedy.
+# Explanations of an unexpected weight of the foot: finding, question, remedy.
 _WEIGHT_WORDS = {
     WeightCause.MASS: (
         "as if the foot weighed {seen:.3f} kg",
@@ -163,12 +163,12 @@ _PUCKS = 7
 
 @dataclass(frozen=True, slots=True)
 class ComputerLoad:
-    """How busy a computer is.
+    """Load of the computer.
 
     Attributes:
-        load: programs that run or wait for a core: the mean of the last minute, or
-            those of this moment where they are more.
-        cores: that this program may use.
+        load: number of running and waiting programs: mean of the last minute, or the
+            present one if larger.
+        cores: number of cores available to this program.
     """
 
     load: float
@@ -178,18 +178,18 @@ class ComputerLoad:
     def now(cls) -> "ComputerLoad":
         """Return the load of this computer."""
         load = os.getloadavg()[0]
-        with suppress(OSError):  # only Linux tells what runs at this moment
+        with suppress(OSError):  # only Linux reports the present number
             words = Path("/proc/loadavg").read_text().split()
             load = max(load, int(words[3].partition("/")[0]))
         return cls(load, available_cores())
 
     @property
     def is_too_much(self) -> bool:
-        """Whether programs have to wait for a core."""
+        """Whether programs wait for a core."""
         return self.load > self.cores
 
     def blamed(self, error: PreflightError) -> PreflightError:
-        """Return a refusal that says first that the computer is too busy."""
+        """Return the error with the busy computer as its first explanation."""
         message = CATALOGUE["too-busy"]
         fields = {**asdict(self), "what": error.message, "then": "then try again"}
         return PreflightError(
@@ -199,7 +199,7 @@ class ComputerLoad:
         )
 
 
-# What a computer that comes too late looks like.
+# Faults that an overloaded computer can cause.
 _OF_TIME = {
     Fault.LOOP_LATE,
     Fault.LOOP_LOST,
@@ -212,7 +212,7 @@ _OF_TIME = {
 
 
 _UNKNOWN = "UNKNOWN - support it"
-# (what a message says of the arm, what is asked of it by now, what it does then)
+# (state of the arm in a message, state requested since, text for it)
 _ARM_BY_NOW = (
     ("idle", ArmState.UNKNOWN, _UNKNOWN),
     ("damped", ArmState.IDLE, IDLE_ARM),
@@ -221,17 +221,17 @@ _ARM_BY_NOW = (
 
 @dataclass(frozen=True, slots=True)
 class FaultContext:
-    """When and where a fault came.
+    """Context of a fault, for its message.
 
     Attributes:
         trial: name of the trial, or "The session".
-        seconds: since the start of the recording [s], None outside of one.
-        bus: what is known of the CAN bus.
-        prompt: what is asked for after it; None = it ends the session.
-        command: with which the work goes on once it has ended.
-        load: of a computer that simulates on the wall clock; None = it does not, or a
-            fault was asked for.
-        state: what the loop asks of the arm by now; None = what the message says.
+        seconds: time since the start of the recording [s], None outside of one.
+        bus: condition of the CAN bus.
+        prompt: the following prompt; None = the session ends.
+        command: command that continues the work after the end.
+        load: load of a computer that simulates in real time; None = it does not, or
+            faults were planned.
+        state: state requested from the arm by now; None = as in the message.
     """
 
     trial: str = "The session"
@@ -250,7 +250,7 @@ def fault_text(verdict: GuardVerdict, context: FaultContext, saved: str = "") ->
 
 
 def fault_words(verdict: GuardVerdict) -> str:
-    """Return what happened, in one sentence, of a fault beside a stricter one."""
+    """Return one sentence on a fault other than the strictest."""
     message, values = _filled(verdict, FaultContext(prompt=None))
     return message.what.format_map(values)
 
@@ -258,10 +258,10 @@ def fault_words(verdict: GuardVerdict) -> str:
 def _filled(
     verdict: GuardVerdict, context: FaultContext
 ) -> tuple[Message, dict[str, object]]:
-    """Return the message of a verdict, and what its fields are filled with.
+    """Return the message of a verdict, and its fields.
 
-    A verdict of the safety circuit is the pendant's unless a monitor is its cause;
-    silence is the bus's, or that of the pucks that are silent.
+    A verdict of the safety circuit is attributed to the pendant unless a monitor caused
+    it; silence to the bus, or to the silent pucks.
     """
     detail, causes = verdict.detail, ""
     is_of_time = verdict.fault in _OF_TIME
@@ -292,14 +292,14 @@ def _filled(
     if context.load is not None and is_of_time:
         values |= {**asdict(context.load), "what": message.what.format_map(values)}
         message = replace(CATALOGUE["too-busy"], arm=message.arm)
-    for said, state, arm in _ARM_BY_NOW:
-        if context.state is state and message.arm.startswith(said):
+    for text, state, arm in _ARM_BY_NOW:
+        if context.state is state and message.arm.startswith(text):
             message = replace(message, arm=arm)
     return message, values
 
 
 def rest_text(mode: SafetyMode, *, is_confirmed: bool) -> str:
-    """Return what the arm does at the end, `is_confirmed` by the safety module."""
+    """Describe the state of the arm at the end, `is_confirmed` by the safety module."""
     if not is_confirmed:
         return f"ARM: {_UNKNOWN}."
     if mode is SafetyMode.E_STOP:

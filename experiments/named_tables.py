@@ -1,4 +1,4 @@
-"""Tables that the options of a command name and describe."""
+"""Load tables as described by the options of a command."""
 
 import argparse
 from collections.abc import Sequence
@@ -25,13 +25,13 @@ def load_named_tables(
     """Read tables as `experiments.arguments.add_table_form` describes them.
 
     Args:
-        args: of the command line.
+        args: options of the command line.
         files: the tables.
-        inputs: further columns of numbers.
-        stones: size of the stones by terrain, as `--stones` gives it.
+        inputs: further numeric columns.
+        stones: size of the stones by terrain, from `--stones`.
 
     Raises:
-        SettingsError: an option is none, or a table does not fit them.
+        SettingsError: an option is invalid, or a table does not fit the options.
     """
     return load_tables(
         files,

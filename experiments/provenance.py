@@ -1,4 +1,4 @@
-"""Where a recording comes from: code, packages, machine."""
+"""Provenance of a recording: code, packages, machine."""
 
 import platform
 import shutil
@@ -26,7 +26,7 @@ def collect() -> dict[str, str]:
 
 
 def diff_patch() -> str:
-    """Return the uncommitted changes of the code, empty when there are none."""
+    """Return the uncommitted changes of the code, empty for none."""
     return _git()[1]
 
 
@@ -39,9 +39,9 @@ def _version(package: str) -> str:
 
 @cache
 def _git() -> tuple[str, str]:
-    """Return commit and uncommitted changes as they were first asked for.
+    """Return commit and uncommitted changes at the first call.
 
-    What runs is what was loaded by then; later changes of the files are not of it.
+    Later changes of the files do not affect the running program.
     """
     folder = Path(__file__).resolve().parent.parent
     git = shutil.which("git")

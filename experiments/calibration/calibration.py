@@ -1,4 +1,4 @@
-"""What a guided calibration is, and the one way through it: `calibrate`."""
+"""Guided calibrations: `GuidedCalibration` and its execution by `calibrate`."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ _Fitted = TypeVar("_Fitted")
 
 @dataclass(frozen=True, slots=True)
 class CalibrationContext:
-    """What a calibration works with.
+    """Context of a calibration.
 
     Attributes:
         console_loop: rig, terminal and operator together.
-        pose_count: how many poses are chosen.
-        poses: of a person, instead [rad], shape (7,) each; () = none.
-        is_forced: keep a fit that is refused as bad.
+        pose_count: number of poses to choose.
+        poses: poses from a file instead [rad], shape (7,) each; () = none.
+        is_forced: write a fit that would be refused.
     """
 
     console_loop: ConsoleLoop
@@ -42,15 +42,15 @@ class CalibrationContext:
 
     @property
     def console(self) -> Console:
-        """Where everything is printed."""
+        """The console of the loop."""
         return self.console_loop.console
 
 
-def _as_they_are(settings: Settings, row: TerrainRow) -> tuple[Settings, TerrainRow]:
+def _unchanged(settings: Settings, row: TerrainRow) -> tuple[Settings, TerrainRow]:
     return settings, row
 
 
-def _keep_any(context: CalibrationContext, fitted: object) -> None:
+def _accept_any(context: CalibrationContext, fitted: object) -> None:
     del context, fitted
 
 
@@ -59,20 +59,18 @@ class GuidedCalibration(Generic[_Measured, _Fitted]):
     """One guided calibration.
 
     Attributes:
-        name: what is calibrated, in a word.
-        collect: asks for what it needs, activates the arm, lets it be moved, lays it
-            down; returns what was measured.
-        fit: returns what that comes to; the arm is idle. Raises SettingsError where it
-            cannot be fitted.
+        name: calibrated quantity, one word.
+        collect: measures with operator and arm, which is laid down at the end.
+        fit: fits the measurement, the arm idle; raises SettingsError if that fails.
         show: prints the result.
-        text: returns the file.
-        use: returns how the file of that name is put to use, in words.
-        path: returns where the file goes, beside rig.toml.
-        made_anew: of what a commissioning stands on, what is measured anew.
-        check: raises SettingsError for a result that is not kept.
-        bare: returns settings and row without the calibration that is made anew.
-        fewest_poses: 0 = it takes no poses.
-        truth: the same file of what is true of a simulated arm; None = not written.
+        text: returns the content of the file.
+        use: returns how to use the file of that name, as text.
+        path: returns the path of the file, in the folder of rig.toml.
+        made_anew: inputs of the commissioning that are measured again.
+        check: raises SettingsError for a result that must not be written.
+        bare: returns settings and row without the old calibration.
+        fewest_poses: least number of poses; 0 = takes no poses.
+        truth: returns the file of the true values of a simulated arm; None = none.
     """
 
     name: str
@@ -83,15 +81,15 @@ class GuidedCalibration(Generic[_Measured, _Fitted]):
     use: Callable[[CalibrationContext, str], str]
     path: Callable[[Settings, TerrainRow], Path]
     made_anew: Collection[str]
-    check: Callable[[CalibrationContext, _Fitted], None] = _keep_any
-    bare: Callable[[Settings, TerrainRow], tuple[Settings, TerrainRow]] = _as_they_are
+    check: Callable[[CalibrationContext, _Fitted], None] = _accept_any
+    bare: Callable[[Settings, TerrainRow], tuple[Settings, TerrainRow]] = _unchanged
     fewest_poses: int = 0
     truth: Callable[[CalibrationContext, _Fitted], str] | None = None
 
     def default_path(
         self, settings: Settings, row: TerrainRow, *, is_fake: bool
     ) -> Path:
-        """Return where the file goes; what is simulated is marked."""
+        """Return the path of the file; simulated ones are marked."""
         path = self.path(settings, row)
         if not is_fake or path.stem.endswith(".fake"):
             return path
@@ -108,11 +106,11 @@ def calibrate(
     context: CalibrationContext,
     out: Path,
 ) -> None:
-    """Collect, fit, show, and write what is not refused to `out`.
+    """Collect, fit, show and check, then write to `out`.
 
     Raises:
-        SettingsError: no safe way, or the fit is bad.
-        PreflightError: not activated, or measured under something that disturbs.
+        SettingsError: there is no safe path, or the fit is bad.
+        PreflightError: the arm was not activated, or the measurement was disturbed.
         StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
     """
     measured = calibration.collect(context)

@@ -1,4 +1,4 @@
-"""traction calibrate friction: turn every motor both ways, fit what resists it."""
+"""traction calibrate friction: turn every motor both ways, fit its friction."""
 
 from dataclasses import dataclass
 
@@ -29,26 +29,26 @@ from wam.calibration.sliding import RecordedLeg, sliding_rows
 from wam.model.constants import ArmConstants, Array
 from wam.model.friction import friction_of, joint_coulomb
 
-# kg m to which first moments are known: calibrated ones, and those of drawings.
+# Uncertainty of first moments [kg m]: calibrated, and from the drawings.
 _KNOWN, _DRAWN = 0.02, 0.1
 _SIGMAS = 1.96
-_SPEEDS = np.array([0.01, 0.05, 0.1, 0.4])  # rad/s, of the table
+_SPEEDS = np.array([0.01, 0.05, 0.1, 0.4])  # rad/s, columns of the table
 
 
 @dataclass(frozen=True, slots=True)
-class RecordedWay:
-    """What was recorded on the way, by its use."""
+class RecordedLegs:
+    """Recorded legs, by their use."""
 
     fitted: list[RecordedLeg]
     held_out: list[RecordedLeg]
 
 
-def collect(context: CalibrationContext) -> RecordedWay:
-    """Have every motor turned to and fro, slow and fast; return all legs.
+def collect(context: CalibrationContext) -> RecordedLegs:
+    """Turn every motor to and fro, slow and fast; returns all legs.
 
     Raises:
-        SettingsError: no safe way.
-        PreflightError: not activated, or something held the arm up.
+        SettingsError: there is no safe path.
+        PreflightError: the arm was not activated, or was obstructed.
         StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
     """
     rig, say = context.rig, context.console.say
@@ -60,7 +60,7 @@ def collect(context: CalibrationContext) -> RecordedWay:
         return [leg.halt for leg in legs]
 
     walk = PoseWalk(context.console_loop, is_free=True)
-    recorded = RecordedWay([], [])
+    recorded = RecordedLegs([], [])
     pose: int | None = None
     for number, arrival in enumerate(arrivals(walk, plan, 0.0)):
         halt = arrival.halt
@@ -75,20 +75,20 @@ def collect(context: CalibrationContext) -> RecordedWay:
     return recorded
 
 
-def fit(context: CalibrationContext, recorded: RecordedWay) -> FrictionFit:
-    """Fit the friction of the motors, and judge it by the legs held out."""
+def fit(context: CalibrationContext, recorded: RecordedLegs) -> FrictionFit:
+    """Fit the friction of the motors, and evaluate it on the held-out legs."""
     rig = context.rig
-    is_known = rig.settings.rig.gravity.model == "calibrated"
+    is_calibrated = rig.settings.rig.gravity.model == "calibrated"
     return fit_friction(
         rig.model.constants,
         sliding_rows(rig.model, rig.law_model, recorded.fitted),
         sliding_rows(rig.model, rig.law_model, recorded.held_out),
-        np.full(21, _KNOWN if is_known else _DRAWN),
+        np.full(21, _KNOWN if is_calibrated else _DRAWN),
     )
 
 
 def show(context: CalibrationContext, fitted: FrictionFit) -> None:
-    """Print the friction of the joints, and what it leaves of the held-out sweep."""
+    """Print the friction of the joints, and the residuals of the held-out sweep."""
     rows = _rows(context.rig.model.constants, fitted)
     show_joints(context.console, "friction [N m]", rows)
     shares = ", ".join(f"{share:.2f}" for share in fitted.residual)
@@ -99,7 +99,7 @@ def show(context: CalibrationContext, fitted: FrictionFit) -> None:
 
 
 def _rows(constants: ArmConstants, fitted: FrictionFit) -> list[tuple[str, Array]]:
-    """Return measures of the friction of the joints [N m], shape (7,) each."""
+    """Rows of the friction of the joints [N m], shape (7,) each."""
     friction = fitted.friction
     curves = [speed_curve(constants, friction, j, _SPEEDS) for j in range(7)]
     return [
@@ -115,10 +115,10 @@ def _rows(constants: ArmConstants, fitted: FrictionFit) -> list[tuple[str, Array
 
 
 def check(context: CalibrationContext, fitted: FrictionFit) -> None:
-    """Refuse a fit that says too little of the legs held out.
+    """Refuse a fit that predicts the held-out legs badly.
 
     Raises:
-        SettingsError: it does, and it is not forced.
+        SettingsError: it does, unless forced.
     """
     if not context.is_forced:
         check_friction(fitted)

@@ -1,4 +1,4 @@
-"""traction calibrate gravity: hold the arm in many poses, fit what it weighs."""
+"""traction calibrate gravity: hold the arm in many poses, fit its first moments."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,17 +26,17 @@ from wam.model.moments import (
     zero_errors,
 )
 
-AVERAGE = 0.5  # s of torques that are averaged
+AVERAGE = 0.5  # s, averaging time of torques
 
 
 @dataclass(frozen=True, slots=True)
 class MeasuredMoments:
-    """The poses as measured, n of them.
+    """Measurements in n poses.
 
     Attributes:
         q: mean joint positions of both approaches [rad], shape (n, 7).
-        tau: mean torques of both: friction cancels [N m], shape (n, 7).
-        friction: half the difference of both [N m], shape (n, 7).
+        tau: mean torques of both, so that friction cancels [N m], shape (n, 7).
+        friction: half the difference of both torques [N m], shape (n, 7).
     """
 
     q: Array
@@ -46,12 +46,12 @@ class MeasuredMoments:
 
 @dataclass(frozen=True, slots=True)
 class WeighedArm:
-    """What the poses say.
+    """Result of the gravity calibration.
 
     Attributes:
-        measured: the poses.
+        measured: the measurements.
         fit: first moments.
-        zeros: of the joints, as far as torques show them.
+        zeros: zero errors of the joints, as far as observable from torques.
     """
 
     measured: MeasuredMoments
@@ -60,11 +60,11 @@ class WeighedArm:
 
 
 def collect(context: CalibrationContext) -> MeasuredMoments:
-    """Have each pose approached from two sides; return what held the arm there.
+    """Approach each pose from two sides; returns the holding torques.
 
     Raises:
-        SettingsError: no safe way.
-        PreflightError: not activated, or touched while it was weighed.
+        SettingsError: there is no safe path.
+        PreflightError: the arm was not activated, or was touched.
         StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
     """
     model = context.rig.model
@@ -82,10 +82,12 @@ def collect(context: CalibrationContext) -> MeasuredMoments:
         rests.setdefault(pose, []).append(walk.rest(AVERAGE))
         if len(rests[pose]) == 2:
             context.console.say(f"pose {pose + 1} measured")
-    return _of_both_sides(list(rests.values()))
+    return _combine_approaches(list(rests.values()))
 
 
-def _of_both_sides(rests: Sequence[Sequence[tuple[Array, Array]]]) -> MeasuredMoments:
+def _combine_approaches(
+    rests: Sequence[Sequence[tuple[Array, Array]]],
+) -> MeasuredMoments:
     q, tau = (
         np.array([[approach[part] for approach in pose] for pose in rests])
         for part in (0, 1)
@@ -98,7 +100,7 @@ def _of_both_sides(rests: Sequence[Sequence[tuple[Array, Array]]]) -> MeasuredMo
 
 
 def fit(context: CalibrationContext, measured: MeasuredMoments) -> WeighedArm:
-    """Fit first moments, and the zeros of the joints to what they leave."""
+    """Fit first moments, and the zeros of the joints to their residuals."""
     constants = context.rig.model.constants
     moments = fit_moments(constants, measured.q, measured.tau)
     return WeighedArm(measured, moments, zero_errors(constants, measured.q, moments))
@@ -113,7 +115,7 @@ def show(context: CalibrationContext, weighed: WeighedArm) -> None:
 def _show_residuals(
     console: Console, moments: MomentFit, measured: MeasuredMoments
 ) -> None:
-    rows = [(str(i), rest) for i, rest in enumerate(moments.residuals, 1)]
+    rows = [(str(i), values) for i, values in enumerate(moments.residuals, 1)]
     rows.append(("dry friction", np.abs(measured.friction).mean(axis=0)))
     show_joints(console, "residual [N m]", rows)
     console.say(
@@ -139,10 +141,10 @@ def _show_zeros(console: Console, zeros: ZeroErrors) -> None:
 
 
 def check(context: CalibrationContext, weighed: WeighedArm) -> None:
-    """Refuse what does not fit, a joint that is zeroed elsewhere, another tool.
+    """Refuse a bad fit, a joint zeroed elsewhere, or another tool.
 
     Raises:
-        SettingsError: one of these, and it is not forced.
+        SettingsError: one of these, unless forced.
     """
     if context.is_forced:
         return

@@ -1,4 +1,4 @@
-"""A person guided at the arm: the rig opened and checked, the arm left idle."""
+"""Guide an operator at the arm: open and check the rig, leave the arm idle."""
 
 import argparse
 from collections.abc import Callable, Collection
@@ -28,15 +28,15 @@ from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
 
 _NOTHING = "Nothing was written."
-_STOPPED = "The move was stopped; it goes on when it is asked for anew only."
-_HOLD = 0.2  # s between a stop and idle
+_STOPPED = "The move was stopped; it does not go on by itself."
+_HOLD = 0.2  # s, from a stop to idle
 
 
 def check_new(out: Path) -> None:
-    """Refuse before the arm moves what could not be written afterwards.
+    """Refuse an output file that could not be written, before the arm moves.
 
     Raises:
-        SettingsError: there is such a file, or no folder for it.
+        SettingsError: the file exists, or its folder does not.
     """
     if out.exists():
         raise SettingsError(
@@ -58,18 +58,18 @@ def guide_person(
     command: str,
     made_anew: Collection[str],
 ) -> int:
-    """Open the rig, check it, do the work; return the exit code.
+    """Open the rig, check it, do the work; returns the exit code.
 
     Args:
-        args: as `add_arm` declares them.
+        args: options of `add_arm`.
         settings: all settings.
         row: the terrain.
-        work: what a person is guided through.
-        command: to start it again.
-        made_anew: of what a commissioning stands on, what is measured anew.
+        work: the guided work.
+        command: command that starts it again.
+        made_anew: inputs of the commissioning that are measured again.
 
     Raises:
-        TractionError: the rig cannot be opened or is not fit.
+        TractionError: the rig cannot be opened or fails the preflight.
     """
     fake = fake_options(args)
     console = Console(color=not args.no_color, goes_on=True)
@@ -86,11 +86,11 @@ def guide_person(
 
 
 def _guided(console_loop: ConsoleLoop, work: Callable[[], None], command: str) -> int:
-    """Do `work` and return the exit code; an error is shown on the console.
+    """Do `work`; returns the exit code; errors are printed on the console.
 
-    Every way out leaves the arm idle: after a stop it holds first, or damps when the
-    stop was asked for twice; an arm that is driven is supported first. The message of a
-    fault names `command` to start again.
+    Every exit leaves the arm idle: after a stop it holds first, or damps after a second
+    request; a driven arm is supported first. The message of a fault names `command` to
+    start again.
     """
     console = console_loop.console
     try:
@@ -103,7 +103,7 @@ def _guided(console_loop: ConsoleLoop, work: Callable[[], None], command: str) -
     except ArmFaultError as fault:
         was_moving = isinstance(fault, MoveStoppedError)
         if was_moving and fault.verdict.action is Action.DAMP:
-            # No hand is on it: what it is too fast by may be its own encoder.
+            # Nobody holds the arm: the excessive speed may be an encoder fault.
             console_loop.make_safe()
         loop_client = console_loop.loop_client
         loop_client.advance(TICK)
@@ -122,7 +122,7 @@ def _guided(console_loop: ConsoleLoop, work: Callable[[], None], command: str) -
         return error.exit_code
     finally:
         console_loop.lay_down()
-        confirmed = console_loop.make_safe()
+        is_confirmed = console_loop.make_safe()
         mode = console_loop.rig.backend.safety_mode()
-        console.say(rest_text(mode, is_confirmed=confirmed))
+        console.say(rest_text(mode, is_confirmed=is_confirmed))
     return 0

@@ -1,4 +1,4 @@
-"""A table of what was fitted for each joint."""
+"""Table of fitted values per joint."""
 
 from collections.abc import Sequence
 
@@ -12,8 +12,8 @@ def show_joints(
     """Print a row for each measure, a column for each joint.
 
     Args:
-        console: where it is printed.
-        quantity: what the numbers are, with their unit.
+        console: output.
+        quantity: name of the quantity, with its unit.
         rows: name of the measure, and its values of joints 1 to 7, shape (7,).
     """
     header = [quantity, *(f"joint {joint}" for joint in range(1, 8))]

@@ -1,4 +1,4 @@
-"""What `traction calibrate` calibrates, by name."""
+"""The calibrations of `traction calibrate`, by name."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -1,4 +1,4 @@
-"""An arm that goes from halt to halt by itself and is measured where it settles."""
+"""Automatic motion from halt to halt, for measurements at rest."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,8 +13,8 @@ class Arrival:
     """The arm stands at a halt.
 
     Attributes:
-        halt: where it stands.
-        seconds: the move and the settling took [s].
+        halt: the halt.
+        seconds: duration of move and settling [s].
     """
 
     halt: MeasurementPose
@@ -25,22 +25,23 @@ def arrivals(walk: PoseWalk, plan: HaltPlan, pause: float) -> Iterator[Arrival]:
     """Activate the arm, move it through all halts, have it laid down after the last.
 
     Args:
-        walk: goes the way.
-        plan: returns the halts, from where the arm is (7,) [rad] and where it may move.
-        pause: how long the arm is kept in each pose [s].
+        walk: moves the arm.
+        plan: returns the halts, given the position of the arm (7,) [rad] and the free
+            space.
+        pause: duration of the stop in each pose [s].
 
     Yields:
-        Each halt, when the arm has settled there.
+        Each halt, once the arm has settled there.
 
     Raises:
-        SettingsError: no safe way.
-        PreflightError: not activated, or something held the arm up.
+        SettingsError: there is no safe path.
+        PreflightError: the arm was not activated, or was obstructed.
         StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
     """
     rig = walk.console_loop.rig
     activate(walk.console_loop)
     for halt in walk.begin(plan, pause):
-        began_ns = rig.clock.now_ns()
+        start_ns = rig.clock.now_ns()
         walk.go_to(halt)
-        yield Arrival(halt, (rig.clock.now_ns() - began_ns) * 1e-9)
+        yield Arrival(halt, (rig.clock.now_ns() - start_ns) * 1e-9)
     walk.end()

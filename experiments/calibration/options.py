@@ -1,4 +1,4 @@
-"""Options of a command that guides a person at an arm; imports nothing slow."""
+"""Options of commands that guide an operator at an arm; imports nothing slow."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def add_arm(parser: argparse.ArgumentParser) -> None:
-    """Declare which arm is guided, and by whom."""
+    """Declare the options of arm and operator."""
     parser.add_argument("--fake", action="store_true", help="simulated devices")
     add_time(parser)
     add_simulated_arm(parser)
@@ -33,7 +33,7 @@ def check_arm(args: argparse.Namespace) -> None:
     """Refuse options of a simulated arm on a real one.
 
     Raises:
-        SettingsError: one of them was given.
+        SettingsError: such an option was given.
     """
     from acquisition.errors import SettingsError
 
@@ -48,14 +48,14 @@ def check_arm(args: argparse.Namespace) -> None:
 def fake_options(
     args: argparse.Namespace, *, spread: bool = False
 ) -> FakeOptions | None:
-    """Return how the simulation runs; None = the rig is real.
+    """Return the options of the simulation; None = the rig is real.
 
     Args:
-        args: as `add_arm` declares them.
-        spread: the rig is one of many sound ones, drawn by the seed.
+        args: options of `add_arm`.
+        spread: draw the rig from the population of sound ones, by the seed.
 
     Raises:
-        SettingsError: joints rub in a way that is not simulated.
+        SettingsError: the friction is not one that can be simulated.
     """
     from experiments.rig.rig import FakeOptions
 

@@ -22,19 +22,19 @@ from wam.model.arm_model import ArmModel
 from wam.model.constants import Array
 
 ROUNDS = 3  # touches of each end
-PRESSED = (2.0, 20.0)  # N, of a sole that lies on the ground
-NEAR = 0.010  # m between touches of one end
-_AIR = 1.5  # s, of a foot held in the air
+PRESSED = (2.0, 20.0)  # N, normal force of a resting sole
+NEAR = 0.010  # m, largest distance of touches of one end from their mean
+_AIR = 1.5  # s, averaging time of a foot held in the air
 _STILL_SPEED = 0.03  # m/s
-_ENDS = ("near", "far")  # in the order in which they are touched
+_ENDS = ("near", "far")  # in order of the touches
 
 
 @dataclass(frozen=True, slots=True)
 class EndTouch:
-    """One end, touched once.
+    """One touch of an end.
 
     Attributes:
-        sole: where the sole lies [m], shape (3,).
+        sole: position of the sole [m], shape (3,).
         q: joint positions [rad], shape (7,).
     """
 
@@ -48,7 +48,7 @@ class TaughtEnds:
 
     Attributes:
         near: mean of the sole's positions at the near end [m], shape (3,).
-        far: the same at the far end.
+        far: mean at the far end [m], shape (3,).
         start: mean joint positions at the far end [rad], shape (7,).
         spread: largest distance of a touch from the mean of its end [m].
     """
@@ -60,7 +60,7 @@ class TaughtEnds:
 
     @property
     def travel(self) -> float:
-        """Length of the way along the plane [m]."""
+        """Distance of the ends along the plane [m]."""
         return float(np.linalg.norm(self.far - self.near))
 
     @property
@@ -71,15 +71,15 @@ class TaughtEnds:
 
     @property
     def incline(self) -> float:
-        """Angle of the way, positive where the far end is the high one [rad]."""
+        """Angle to the horizontal, positive if the far end is high [rad]."""
         return float(np.arcsin((self.far - self.near)[2] / self.travel))
 
 
 def collect(context: CalibrationContext) -> list[EndTouch]:
-    """Have the ends touched by turns, the near one first; return the touches.
+    """Have the ends touched alternately, the near one first; returns the touches.
 
     Raises:
-        PreflightError: not activated.
+        PreflightError: the arm was not activated.
         StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
     """
     console_loop, model = context.console_loop, context.rig.model
@@ -103,7 +103,7 @@ def collect(context: CalibrationContext) -> list[EndTouch]:
 
 
 def _payload_in_the_air(context: CalibrationContext) -> Payload:
-    """Return the payload as it weighs in the air; waits for a foot held still."""
+    """Return the payload tared in the air, once the foot is held still."""
     console_loop, rig = context.console_loop, context.rig
     client, say = console_loop.loop_client, context.console.say
     say("Lift the foot clear of everything and keep it still.")
@@ -127,10 +127,10 @@ def _payload_in_the_air(context: CalibrationContext) -> Payload:
 
 
 def _end_touch(at_rest: Record, model: ArmModel, payload: Payload) -> EndTouch:
-    """Return where the sole lies.
+    """Return the touch of a resting sole.
 
     Raises:
-        PreflightError: it is pressed by too much or too little.
+        PreflightError: the sole is pressed too much or too little.
     """
     q = at_rest["position"].mean(axis=0)
     rotation = model.sole_pose(q)[1]
@@ -146,26 +146,26 @@ def _end_touch(at_rest: Record, model: ArmModel, payload: Payload) -> EndTouch:
 
 
 def fit_ends(near: Sequence[EndTouch], far: Sequence[EndTouch]) -> TaughtEnds:
-    """Return what the touches of both ends come to.
+    """Average the touches of both ends.
 
     Raises:
-        PreflightError: those of one end lie apart.
+        PreflightError: the touches of one end scatter too much.
     """
     means: list[Array] = []
     spread = 0.0
     for end, touches in zip(_ENDS, (near, far), strict=True):
         points = np.array([touched.sole for touched in touches])
         mean = points.mean(axis=0)
-        apart = float(np.linalg.norm(points - mean, axis=1).max())
-        if apart > NEAR:
+        distance = float(np.linalg.norm(points - mean, axis=1).max())
+        if distance > NEAR:
             raise PreflightError(
-                f"The touches of the {end} end lie {1e3 * apart:.0f} mm from their "
+                f"The touches of the {end} end lie {1e3 * distance:.0f} mm from their "
                 f"mean (limit {1e3 * NEAR:g}).",
                 hint="Mark the two points, then teach the place again. Nothing was "
                 "written.",
             )
         means.append(mean)
-        spread = max(spread, apart)
+        spread = max(spread, distance)
     start = np.array([touched.q for touched in far]).mean(axis=0)
     return TaughtEnds(means[0], means[1], start, spread)
 
@@ -194,7 +194,7 @@ def _taught_place(
 
 
 def show(context: CalibrationContext, taught: TaughtPlace) -> None:
-    """Print where the container stands."""
+    """Print the taught place."""
     x, y, z = taught.far_end
     context.console.say(
         f"far end {x:.3f}, {y:.3f}, {z:.3f} m, travel {taught.travel:.3f} m, heading "
@@ -205,7 +205,7 @@ def show(context: CalibrationContext, taught: TaughtPlace) -> None:
 
 
 def place_calibration(place: str) -> GuidedCalibration[list[EndTouch], TaughtPlace]:
-    """Return the calibration of a place of that name."""
+    """Return the calibration that teaches the place of that name."""
 
     def fit(context: CalibrationContext, touches: list[EndTouch]) -> TaughtPlace:
         return _taught_place(context, place, fit_ends(touches[::2], touches[1::2]))

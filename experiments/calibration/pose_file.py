@@ -1,4 +1,4 @@
-"""The poses of a calibration as a person has chosen them: a TOML file."""
+"""Poses of a calibration from a TOML file."""
 
 from pathlib import Path
 from typing import cast
@@ -19,7 +19,7 @@ from wam.model.constants import Array, load_constants
 
 
 class PoseFile(SettingsSection):
-    """Joint positions [rad] that a person has chosen, joints 1 to 7 in each row."""
+    """Joint positions [rad], joints 1 to 7 in each row."""
 
     poses: tuple[tuple[Near, Near, Near, Near, Near, Near, Near], ...]
 
@@ -27,14 +27,14 @@ class PoseFile(SettingsSection):
 def read_poses(
     path: Path, settings: Settings, row: TerrainRow, counts: range
 ) -> list[Array]:
-    """Return the poses [rad], shape (7,) each, of a file that a person wrote.
+    """Read poses [rad], shape (7,) each, from a TOML file.
 
-    It is TOML: `poses = [[0.0, -0.4, 0.0, 1.8, 0.0, -0.4, 0.0], ...]`, joints 1 to 7.
-    `counts`: how many there may be; none where a calibration takes no poses.
+    Format: `poses = [[0.0, -0.4, 0.0, 1.8, 0.0, -0.4, 0.0], ...]`, joints 1 to 7.
+    `counts`: permitted numbers of poses; empty if a calibration takes none.
 
     Raises:
-        SettingsError: no such file, no poses, as many as are not taken, or one that is
-            not safe.
+        SettingsError: the file is missing, has no poses or a wrong number of them, or
+            a pose is not safe.
     """
     poses = [np.array(pose) for pose in _parse(path, counts).poses]
     model = ArmModel(load_constants(), build_tool(settings.rig, row.foot))
@@ -43,14 +43,16 @@ def read_poses(
 
 
 def _parse(path: Path, counts: range) -> PoseFile:
-    """Read the file; of a list that is too long no member is looked at."""
+    """Read the file; a list that is too long is refused before its validation."""
     try:
         table = parse_toml(read_text(path))
     except (OSError, ValueError) as error:
-        raise _unread(path, getattr(error, "strerror", None) or str(error)) from error
+        raise _unreadable(
+            path, getattr(error, "strerror", None) or str(error)
+        ) from error
     listed = table.get("poses")
     if not isinstance(listed, list):
-        raise _unread(path, "no list of that name")
+        raise _unreadable(path, "no list of that name")
     count = len(cast("list[object]", listed))
     if count not in counts:
         wanted = f"{counts[0]}..{counts[-1]}" if counts else "none"
@@ -61,10 +63,10 @@ def _parse(path: Path, counts: range) -> PoseFile:
     try:
         return PoseFile.model_validate(table)
     except ValidationError as error:
-        raise _unread(path, first_problem(error)) from error
+        raise _unreadable(path, first_problem(error)) from error
 
 
-def _unread(path: Path, why: str) -> SettingsError:
+def _unreadable(path: Path, why: str) -> SettingsError:
     return SettingsError(
         f"{path} holds no poses: {why}.",
         hint="Write poses = [[...], ...], seven angles in rad each. Nothing was "

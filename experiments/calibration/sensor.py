@@ -1,7 +1,7 @@
-"""traction calibrate sensor, foot: turn the foot to all sides, fit what it weighs.
+"""traction calibrate sensor, foot: turn the foot to all sides, fit its weight.
 
-Of the sensor the mounting is fitted too; another foot hangs on a sensor whose mounting
-is known.
+`sensor` fits the mounting of the sensor too; `foot` is for another foot on a sensor
+whose mounting is known.
 """
 
 from dataclasses import dataclass
@@ -23,17 +23,17 @@ from wam.calibration.poses import MeasurementPose, choose_orientations, plan_way
 from wam.model.constants import Array
 from wam.model.tool import Tool
 
-AVERAGE = 2.0  # s of readings that are averaged in each orientation
+AVERAGE = 2.0  # s, averaging time in each orientation
 _FEWEST = 100  # readings in an average
 
 
 @dataclass(frozen=True, slots=True)
 class MeasuredOrientations:
-    """The foot turned to n sides; the last is the first again.
+    """Measurements in n orientations of the foot; the last repeats the first.
 
     Attributes:
-        rotations: of frame 7 in the base frame, shape (n, 3, 3).
-        readings: mean raw readings there [N, N m], shape (n, 6).
+        rotations: orientations of frame 7 in the base frame, shape (n, 3, 3).
+        readings: mean raw readings [N, N m], shape (n, 6).
     """
 
     rotations: Array
@@ -41,23 +41,23 @@ class MeasuredOrientations:
 
     @property
     def drift(self) -> float:
-        """How far the forces of the first have changed at the end [N]."""
+        """Change of the force between first and last orientation [N]."""
         forces = self.readings[:, :3]
         return float(np.linalg.norm(forces[-1] - forces[0]))
 
     def fit(self, mounting: tuple[float, float] | None = None) -> SensorFit:
-        """Fit what the sensor carries, and its mounting where it is not known."""
+        """Fit the load of the sensor, and its mounting if not given."""
         return fit_sensor(self.rotations[:-1], self.readings[:-1], mounting)
 
 
 @dataclass(frozen=True, slots=True)
 class WeighedFoot:
-    """What the orientations say.
+    """Result of the sensor or foot calibration.
 
     Attributes:
-        measured: the orientations.
+        measured: the measurements.
         fit: foot and mounting.
-        free: with the mounting fitted too, where that of `fit` was known.
+        free: fit with free mounting, if that of `fit` was given.
     """
 
     measured: MeasuredOrientations
@@ -66,13 +66,13 @@ class WeighedFoot:
 
 
 def collect(context: CalibrationContext) -> MeasuredOrientations:
-    """Have the foot turned to all sides; return what the sensor reads there.
+    """Turn the foot to all sides; returns the readings of the sensor.
 
-    The first orientation is measured again at the end: what has changed is drift.
+    The first orientation is repeated at the end to measure drift.
 
     Raises:
-        SettingsError: no safe way.
-        PreflightError: not activated, touched meanwhile, or too few readings.
+        SettingsError: there is no safe path.
+        PreflightError: the arm was not activated or was touched, or too few readings.
         StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
     """
     rig, model = context.rig, context.rig.model
@@ -97,10 +97,10 @@ def collect(context: CalibrationContext) -> MeasuredOrientations:
 
 
 def _mean_reading(rig: Rig) -> Array:
-    """Return the mean of the last two seconds [N, N m], shape (6,).
+    """Mean reading of the last two seconds [N, N m], shape (6,).
 
     Raises:
-        PreflightError: too few readings, or one that is not valid.
+        PreflightError: too few readings, or an invalid one.
     """
     records: Record = rig.shared.wrenches.last(WRENCH_SLOTS)
     since = rig.clock.now_ns() - int(AVERAGE * 1e9)
@@ -125,8 +125,7 @@ def fit(context: CalibrationContext, measured: MeasuredOrientations) -> WeighedF
     """Fit foot and mounting.
 
     Raises:
-        SettingsError: orientations too few or too much alike, or readings that do not
-            change.
+        SettingsError: too few or too similar orientations, or constant readings.
     """
     del context
     return WeighedFoot(measured, measured.fit())
@@ -135,14 +134,14 @@ def fit(context: CalibrationContext, measured: MeasuredOrientations) -> WeighedF
 def fit_foot(
     context: CalibrationContext, measured: MeasuredOrientations
 ) -> WeighedFoot:
-    """Fit a foot on a sensor that is mounted as rig.toml says; raises as `fit`."""
+    """Fit a foot on a sensor mounted as in rig.toml; raises as `fit`."""
     tool = _tool(context)
     mounted = measured.fit((tool.sensor_angle, tool.sensor_sign))
     return WeighedFoot(measured, mounted, measured.fit())
 
 
 def show_foot(context: CalibrationContext, weighed: WeighedFoot) -> None:
-    """Print what hangs on the sensor, its mounting, and what they leave."""
+    """Print the load of the sensor, its mounting, and the residuals."""
     fitted, say = weighed.fit, context.console.say
     com = ", ".join(f"{1e3 * value:.1f}" for value in fitted.com)
     bias = ", ".join(f"{value:.2f}" for value in fitted.bias[:3])
@@ -158,7 +157,7 @@ def show_foot(context: CalibrationContext, weighed: WeighedFoot) -> None:
 
 
 def show(context: CalibrationContext, weighed: WeighedFoot) -> None:
-    """Print the same, and where the sensor is not mounted as rig.toml has it."""
+    """Print `show_foot`, and how the mounting differs from rig.toml."""
     show_foot(context, weighed)
     tool, fitted = _tool(context), weighed.fit
     if fitted.sign != tool.sensor_sign:
@@ -174,10 +173,10 @@ def show(context: CalibrationContext, weighed: WeighedFoot) -> None:
 
 
 def check(context: CalibrationContext, weighed: WeighedFoot) -> None:
-    """Refuse a fit that leaves too much of the forces.
+    """Refuse a fit with large residuals.
 
     Raises:
-        SettingsError: it does, and it is not forced.
+        SettingsError: the residuals are too large, unless forced.
     """
     check_residual(weighed.fit, is_forced=context.is_forced, free=weighed.free)
 

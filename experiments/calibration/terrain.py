@@ -27,11 +27,11 @@ MOST = 60  # points
 
 @dataclass(frozen=True, slots=True)
 class TouchedContainer:
-    """A container, and where it was touched.
+    """A touched container.
 
     Attributes:
         fit: its frame.
-        points: of the sole, base frame [m], shape (3,) each.
+        points: positions of the sole, base frame [m], shape (3,) each.
     """
 
     fit: ContainerFit
@@ -39,10 +39,10 @@ class TouchedContainer:
 
 
 def collect(context: CalibrationContext) -> list[Array]:
-    """Have the corners touched; return the points [m], shape (3,) each.
+    """Have the corners touched; returns the points [m], shape (3,) each.
 
     Raises:
-        PreflightError: not activated.
+        PreflightError: the arm was not activated.
         StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
     """
     with afloat(context.console_loop):
@@ -77,14 +77,14 @@ def fit(context: CalibrationContext, points: list[Array]) -> TouchedContainer:
     """Fit the frame of the container.
 
     Raises:
-        SettingsError: the corners make no container.
+        SettingsError: the corners do not form a container.
     """
     del context
     return TouchedContainer(fit_terrain(np.array(points)), points)
 
 
 def show(context: CalibrationContext, touched: TouchedContainer) -> None:
-    """Print the frame beside the row of the matrix."""
+    """Print the frame, compared with the row of the matrix."""
     fitted, row, say = touched.fit, context.rig.row, context.console.say
     frame = fitted.frame
     x, y, z = frame.far_end
@@ -99,10 +99,10 @@ def show(context: CalibrationContext, touched: TouchedContainer) -> None:
 
 
 def check(context: CalibrationContext, touched: TouchedContainer) -> None:
-    """Refuse a container that is not inclined as its row says.
+    """Refuse a container whose incline differs from that of its row.
 
     Raises:
-        SettingsError: it is not, and it is not forced.
+        SettingsError: it differs, unless forced.
     """
     check_terrain(touched.fit, context.rig.frame, is_forced=context.is_forced)
 
@@ -122,7 +122,7 @@ def text(context: CalibrationContext, touched: TouchedContainer) -> str:
 
 
 def bare(settings: Settings, row: TerrainRow) -> tuple[Settings, TerrainRow]:
-    """Return the row as the matrix has it, without where it was touched before."""
+    """Return settings and row as in the matrix, without the old calibration."""
     drawn = row.as_container().model_copy(update={"calibration": None})
     return settings.with_row(drawn), drawn
 

@@ -1,4 +1,4 @@
-"""An arm that floats and is led by hand; the sole is put down where it is asked for."""
+"""Touching points with the sole of a floating arm led by hand."""
 
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
@@ -15,18 +15,18 @@ from experiments.run.console_loop import ConsoleLoop
 from experiments.run.ready import activate
 from experiments.session.sidecar import TrialName
 
-AVERAGE = 0.3  # s of positions that are averaged
-STILL = 0.003  # m that the sole may move meanwhile
+AVERAGE = 0.3  # s, averaging time of positions
+STILL = 0.003  # m, largest motion of the sole meanwhile
 
 _T = TypeVar("_T")
 
 
 @contextmanager
 def afloat(console_loop: ConsoleLoop) -> Generator[None]:
-    """Activate the arm and let it float; have it laid down when the touches are taken.
+    """Context of an activated, floating arm, which is laid down at the end.
 
     Raises:
-        PreflightError: not activated.
+        PreflightError: the arm was not activated.
         StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
     """
     activate(console_loop)
@@ -44,15 +44,15 @@ def touch(
     *,
     may_end: bool = False,
 ) -> _T | None:
-    """Wait for [space] and return what `take` makes of a sole that lies still.
+    """Wait for [space]; returns the result of `take` for a sole at rest.
 
-    It is asked for again while it moves or `take` refuses it.
+    Asks again while the sole moves or `take` refuses it.
 
     Args:
-        console_loop: of the rig.
-        number: of the touch.
-        take: gets the cycles at rest, raises PreflightError for what is no touch.
-        may_end: [d] ends the touches: None is returned.
+        console_loop: console loop of the rig.
+        number: number of the touch.
+        take: receives the cycles at rest; raises PreflightError to refuse them.
+        may_end: whether [d] ends the touches, with None as the result.
 
     Raises:
         StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.

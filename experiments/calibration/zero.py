@@ -1,4 +1,4 @@
-"""traction zero: the motor controllers count from the home position at which they are.
+"""traction zero: define the present position of the arm as home.
 
 Nothing moves and nothing is fitted, so it is no `GuidedCalibration`.
 """
@@ -15,15 +15,15 @@ from wam.driver.startup import ArmInfo
 
 
 def define_home(rig: Rig, console: Console, confirm: Callable[[], bool]) -> bool:
-    """Show the home position, have it confirmed, define it; return whether it was.
+    """Show the home position, have it confirmed, define it; returns whether it was.
 
     Args:
-        rig: its bus is open, its loop not started.
-        console: where everything is printed.
+        rig: the rig, its bus open, its loop not started.
+        console: output.
         confirm: asks whether the arm is at home.
 
     Raises:
-        PreflightError: the arm is not fit, or not where home was last time.
+        PreflightError: the arm is not fit, or not at its previous home.
     """
     info = _start(rig)
     home = rig.model.constants.home
@@ -36,14 +36,16 @@ def define_home(rig: Rig, console: Console, confirm: Callable[[], bool]) -> bool
     if not confirm():
         console.say("Nothing was changed. ARM: idle; it sinks slowly, support it.")
         return False
-    _check_encoders(rig, _start(rig), console)  # it was moved until now
+    _check_encoders(
+        rig, _start(rig), console
+    )  # the arm was moved before the confirmation
     rig.backend.ask(DefinePosition(home.tolist()))
     console.check(GOOD, "zero", "positions defined at home")
     return True
 
 
 def _start(rig: Rig) -> ArmInfo:
-    """Ask the arm who it is; raise PreflightError when it is not fit."""
+    """Start the arm; raises PreflightError if it is not fit."""
     try:
         return rig.backend.ask(StartArm())
     except TractionError as error:
@@ -52,10 +54,10 @@ def _start(rig: Rig) -> ArmInfo:
 
 
 def _check_encoders(rig: Rig, info: ArmInfo, console: Console) -> None:
-    """Compare the absolute encoders with those of the last time, or say what to note.
+    """Compare the absolute encoders with the previous home, or print them.
 
     Raises:
-        PreflightError: the arm is not where home was.
+        PreflightError: the arm is not at its previous home.
     """
     rig.serials = serial_numbers(rig, info)
     check_identity(rig, console.check)

@@ -1,4 +1,4 @@
-"""traction bench: measures the control loop on this machine."""
+"""traction bench: measure the control loop on this machine."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure and print; return the exit code."""
+    """Measure and print; returns the exit code."""
     import json
     import os
     from contextlib import closing
@@ -62,8 +62,8 @@ def run(args: argparse.Namespace) -> int:
         console.say(json.dumps(report.as_dict(), indent=2))
     else:
         _print(report, args.seconds, console)
-    is_wanted = args.fake or report.fault  # a real arm stays idle unless one says why
-    return PreflightError.exit_code if is_wanted and not report.is_powered else 0
+    must_power = args.fake or report.fault  # a real arm without a fault stays idle
+    return PreflightError.exit_code if must_power and not report.is_powered else 0
 
 
 def _print(report: BenchReport, seconds: float, console: Console) -> None:

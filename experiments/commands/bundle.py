@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the bundle; say what is in it and what is not."""
+    """Write the bundle and print what it contains and omits."""
     from acquisition.errors import SettingsError
     from experiments.export.bundle import write_bundle
     from experiments.operator.console import WARNING, Console

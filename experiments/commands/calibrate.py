@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Lead through one calibration and write its file; return the exit code."""
+    """Guide through one calibration and write its file; returns the exit code."""
     from experiments.calibration.calibration import CalibrationContext, calibrate
     from experiments.calibration.guiding import check_new, guide_person
     from experiments.calibration.kinds import CALIBRATIONS

@@ -1,4 +1,4 @@
-"""traction check: is the rig fit to run? The arm stays idle, no torque is sent."""
+"""traction check: check whether the rig is fit, the arm idle without torque."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def _check(args: argparse.Namespace, settings: Settings, console: Console) -> No
 
 
 def _as_json(args: argparse.Namespace, settings: Settings) -> int:
-    """Print the page as JSON, with the refusal where there is one, which is raised.
+    """Print the page as JSON, with its error, which is then raised.
 
     Raises:
         PreflightError: a check failed.
@@ -149,10 +149,10 @@ def _as_json(args: argparse.Namespace, settings: Settings) -> int:
 def _listen(
     settings: Settings, seconds: float, console: Console, *, is_fake: bool
 ) -> int:
-    """Say who talks on the arm's bus; nothing is sent.
+    """Print the traffic of the arm's bus; nothing is sent.
 
     Raises:
-        SettingsError: a simulated bus is inside its own process only.
+        SettingsError: a simulated bus exists only inside its own process.
         LinkError: the bus cannot be opened, or broke.
     """
     from acquisition.clock import SystemClock
@@ -182,15 +182,15 @@ def _listen(
     finally:
         link.close()
     load = traffic.load(seconds, can.bitrate)
-    _say_traffic(traffic.counts, seconds, load, console)
-    _say_trouble(link.foreign_ids, link.errors, console)
+    _print_traffic(traffic.counts, seconds, load, console)
+    _print_errors(link.foreign_ids, link.errors, console)
     return 0
 
 
-def _say_traffic(
+def _print_traffic(
     counts: Mapping[int, int], seconds: float, load: float, console: Console
 ) -> None:
-    """Say how often each identifier was heard."""
+    """Print the rate of each identifier."""
     from experiments.operator.console import GOOD
     from wam.bus.decoder import describe_id
 
@@ -203,8 +203,10 @@ def _say_traffic(
         console.say(f"   {can_id:03X} {count / seconds:8.1f}/s  {describe_id(can_id)}")
 
 
-def _say_trouble(foreign: Collection[int], errors: BusErrors, console: Console) -> None:
-    """Say who else is master, and what the controller reports."""
+def _print_errors(
+    foreign: Collection[int], errors: BusErrors, console: Console
+) -> None:
+    """Print other masters and the errors of the controller."""
     from acquisition.devices import BusCondition
     from experiments.messages import BUS_WORDS
     from experiments.operator.console import BAD, GOOD, WARNING

@@ -1,4 +1,4 @@
-"""traction commission: the first day of an arm, guided, each step one proof."""
+"""traction commission: guided commissioning of an arm, step by step."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do the steps that are due and return the exit code."""
+    """Run the due steps; returns the exit code."""
     from experiments.commissioning.guide import RecordFolder, recheck
     from experiments.operator.console import Console
     from experiments.operator.scripted import choose_operator
@@ -95,19 +95,19 @@ def run(args: argparse.Namespace) -> int:
     if args.daily:
         return _daily(args, settings, fake, files, who, console, operator)
     _note_changes(args, files)
-    code = _sittings(args, settings, fake, steps, files, who, console, operator)
+    code = _run_steps(args, settings, fake, steps, files, who, console, operator)
     if code == 0:
-        _say_end(files, settings.row(_terrain(args, settings)).name, console)
+        _print_remaining(files, settings.row(_terrain(args, settings)).name, console)
     return code
 
 
 def _terrain(args: argparse.Namespace, settings: Settings) -> str:
-    """Return the terrain whose container C13 looks at."""
+    """Return the terrain whose container C13 checks."""
     return args.terrain or settings.matrix.terrains[0].name
 
 
-def _say_end(files: RecordFolder, terrain: str, console: Console) -> None:
-    """Say what is left to do, or that the arm is commissioned."""
+def _print_remaining(files: RecordFolder, terrain: str, console: Console) -> None:
+    """Print the remaining steps, or that the arm is commissioned."""
     from experiments.commissioning.evidence.gate import lacks
     from experiments.commissioning.evidence.record import NAME
     from experiments.commissioning.procedure import STEPS
@@ -122,7 +122,7 @@ def _say_end(files: RecordFolder, terrain: str, console: Console) -> None:
 
 
 def _note_changes(args: argparse.Namespace, files: RecordFolder) -> None:
-    """Write what a person says that changed; an empty record has nothing stale."""
+    """Record the changes reported by options; an empty record has nothing stale."""
     from datetime import UTC, datetime
 
     from acquisition.clock import SystemClock
@@ -131,12 +131,12 @@ def _note_changes(args: argparse.Namespace, files: RecordFolder) -> None:
     if not files.record.steps:
         return
     now = datetime.fromtimestamp(SystemClock().utc_ns() // 1_000_000_000, UTC)
-    for name, is_told in zip(TOLD, (args.moved, args.tensioned), strict=True):
-        if is_told:
+    for name, is_reported in zip(TOLD, (args.moved, args.tensioned), strict=True):
+        if is_reported:
             files.tell(name, now)
 
 
-def _sittings(
+def _run_steps(
     args: argparse.Namespace,
     settings: Settings,
     fake: FakeOptions | None,
@@ -146,7 +146,7 @@ def _sittings(
     console: Console,
     operator: OperatorInput,
 ) -> int:
-    """Do the steps, as many on one connection as can be; return the exit code."""
+    """Run the steps, as many per connection as possible; returns the exit code."""
     from experiments.commissioning.guide import do_step, wanted
     from experiments.commissioning.procedure import SITTINGS
     from experiments.run.stop import StopRequestedError
@@ -178,10 +178,10 @@ def _daily(
     console: Console,
     operator: OperatorInput,
 ) -> int:
-    """Do the daily check and return the exit code."""
+    """Run the daily check; returns the exit code."""
     from experiments.commissioning.daily import do_daily, reference_of
 
-    reference_of(files)  # before anything is touched
+    reference_of(files)  # raises before the rig is touched
     row = settings.row(_terrain(args, settings)).as_container()
 
     def work(scene: Scene) -> int:
@@ -199,7 +199,7 @@ def _on_rig(
     operator: OperatorInput,
     work: Callable[[Scene], int],
 ) -> int:
-    """Do `work` on one connection and return its exit code, or that of its end."""
+    """Run `work` on one connection; returns its exit code, or that of an abort."""
     from experiments.commissioning.scene import Scene
     from experiments.operator.terminal import keyboard
     from experiments.preflight.connecting import connect_rig

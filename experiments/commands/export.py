@@ -16,7 +16,7 @@ EXAMPLES = """\
   traction export --terrain-db terrains.json --for c,onnx --to controller"""
 
 _NOTHING = "Nothing was written."
-# Options that belong to one use; each is None or False where it is not given.
+# Options of one use only; None or False if not given.
 _OF_TRIALS = ("format", "standard_rate")
 _OF_TARGETS = ("terrain", "model", "float")
 
@@ -75,7 +75,7 @@ def _add_targets(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write what is asked for and return the exit code."""
+    """Write the export; returns the exit code."""
     from acquisition.errors import SettingsError
     from experiments.operator.console import Console
 
@@ -93,10 +93,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check_use(args: argparse.Namespace) -> None:
-    """Refuse options that belong to another use of the command.
+    """Refuse options of another use of the command.
 
     Raises:
-        SettingsError: there are some, or what their use needs is missing.
+        SettingsError: there are such options, or a required one is missing.
     """
     from acquisition.errors import SettingsError
 

@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_arm(parser: argparse.ArgumentParser) -> None:
-    """Declare how the arm is found, and who holds it."""
+    """Declare the initial state of the arm, and who holds it."""
     parser.add_argument(
         "--bare",
         action="store_true",
@@ -94,7 +94,7 @@ def _add_arm(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_truth(parser: argparse.ArgumentParser) -> None:
-    """Declare where the arm is, and what is true of it."""
+    """Declare the pose of the arm and its true deviations."""
     parser.add_argument(
         "--pose",
         choices=("home", "rest"),
@@ -120,7 +120,7 @@ def _add_truth(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Serve until a signal ends it and return the exit code."""
+    """Serve until a signal; returns the exit code."""
     from acquisition.clock import SystemClock
     from experiments.operator.console import Console
     from experiments.operator.pendant import Lines, Pendant, read_script
@@ -157,7 +157,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _served(args: argparse.Namespace) -> ServedArm | None:
-    """Return the arm that is to be served; None = none."""
+    """Return the arm to serve; None = none."""
     from experiments.rig.fake import ServedArm
 
     if not args.can:
@@ -177,7 +177,7 @@ def _served(args: argparse.Namespace) -> ServedArm | None:
 
 
 def _line(args: argparse.Namespace) -> tuple[Path, str] | None:
-    """Return where a serial sensor is served and its kind; None = nowhere."""
+    """Return path and kind of a served serial sensor; None = none."""
     from acquisition.errors import SettingsError
     from ft_sensor.vendors.registry import SERIAL_KINDS
 
@@ -190,12 +190,12 @@ def _line(args: argparse.Namespace) -> tuple[Path, str] | None:
 
 
 def _tool(args: argparse.Namespace) -> str:
-    """Return what hangs on the plate; --tool counts more than --bare."""
+    """Return the tool on the plate; --tool takes precedence over --bare."""
     return args.tool or ("none" if args.bare else "")
 
 
 def _firmware(text: str) -> tuple[int, int]:
-    """Return the firmware of the pucks and of the safety module.
+    """Parse the firmware of the pucks and of the safety module.
 
     Raises:
         ArgumentTypeError: neither one number nor two.
@@ -211,7 +211,7 @@ def _firmware(text: str) -> tuple[int, int]:
 def _serve_sensor(
     settings: Settings, args: argparse.Namespace, console: Console
 ) -> int:
-    """Serve a sensor without an arm until a signal ends it."""
+    """Serve a sensor without an arm until a signal."""
     from acquisition.errors import SettingsError
     from experiments.rig.fake import build_sensor_server
     from experiments.run.stop import StopFlag, handle_signals
@@ -235,7 +235,7 @@ def _serve_sensor(
 
 
 def _press(server: Pressable, orders: list[Order]) -> bool:
-    """Press buttons, order the hands in turn; return False once there is a quit."""
+    """Execute orders to pendant and hands in turn; returns False after a quit."""
     for order in orders:
         if order == "quit":
             return False
@@ -260,7 +260,7 @@ def _split(text: str) -> tuple[str, str]:
 
 
 def _stdin() -> int | None:
-    """Return the descriptor of stdin, None where there is none."""
+    """Return the descriptor of stdin, or None."""
     import sys
 
     try:

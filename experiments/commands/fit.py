@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     """Fit tables and write the report."""
     from acquisition.extras import require_extra
 
-    require_extra("report")  # before its page is imported
+    require_extra("report")  # before the page is imported
     if args.scheduler:
         require_extra("cluster")
     from experiments.report.workers import workers_of_report
@@ -92,10 +92,10 @@ def _fit(args: argparse.Namespace) -> int:
             f"--covariate and --inputs both name {both}.", hint="Leave one out."
         )
     trials = load_named_tables(args, args.files, inputs, args.stones)
-    beside = [name for name in columns if name != WAY]
+    table_columns = [name for name in columns if name != WAY]
     tested = trials
-    if beside:
-        further = (*inputs, *beside)
+    if table_columns:
+        further = (*inputs, *table_columns)
         tested = load_named_tables(args, args.files, further, args.stones)
     page = report_tables_of_trials(
         args.files, args.to, trials, tested, request, console

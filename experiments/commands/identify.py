@@ -1,4 +1,4 @@
-"""traction identify: which terrain is this? Probabilities over time."""
+"""traction identify: probabilities of the terrains over time."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Recognise the ground of every trial; return the exit code."""
+    """Identify the terrain of every trial; returns the exit code."""
     import json
     from dataclasses import asdict
 
@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _series(args: argparse.Namespace) -> list[TractionSeries]:
-    """Return the trials of all files, recorded ones and tables."""
+    """Return the trials of all files, recordings and tables."""
     from analysis.data.load import load_trial
     from experiments.named_tables import load_named_tables
 

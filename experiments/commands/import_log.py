@@ -124,7 +124,7 @@ def _add_ground(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Import a log, or say what it holds, and return the exit code."""
+    """Import a log, or print its content; returns the exit code."""
     from acquisition.errors import SettingsError
     from experiments.operator.console import WARNING, Console
 
@@ -164,7 +164,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _plain(args: argparse.Namespace) -> dict[str, str]:
-    """Return the options that were given, as text."""
+    """Return the given options as text."""
     left_out = {"run", "command", "verbose", "no_color", "config", "data", "list"}
     return {
         name.replace("_", "-"): str(value)
@@ -174,7 +174,7 @@ def _plain(args: argparse.Namespace) -> dict[str, str]:
 
 
 def request_of(args: argparse.Namespace) -> ImportRequest:
-    """Return what is stated; raises SettingsError."""
+    """Build the request from the options; raises SettingsError."""
     from analysis.logs.request import ImportRequest
 
     return ImportRequest(
@@ -221,7 +221,7 @@ def _span(option: str, text: str) -> tuple[float, float]:
 
 
 def _trials(text: str) -> list[tuple[float, float]]:
-    """Return spans that share no time: each row belongs to one trial."""
+    """Parse disjoint spans of time: each row belongs to one trial."""
     from itertools import pairwise
 
     from acquisition.errors import SettingsError

@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write both files, or neither where one is there already."""
+    """Write both files, or neither if one exists already."""
     from acquisition.errors import SettingsError
     from experiments.operator.console import Console
     from experiments.session.data_files import write_new_text

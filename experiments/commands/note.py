@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the remark into the journal, and beside the trial."""
+    """Write the note into the journal and the trial's sidecar."""
     from experiments.operator.console import Console
     from experiments.session.annotations import add_note, looks_like_trial
     from experiments.session.store import find_session

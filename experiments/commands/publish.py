@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the publication and return the exit code."""
+    """Write the publication; returns the exit code."""
     from experiments.export.credits import LICENCES, parse_author
     from experiments.export.publication import PublishRequest, publish_sessions
     from experiments.operator.console import Console

@@ -17,12 +17,12 @@ EXAMPLES = """\
 
 _PARTIAL = "*.mcap.partial"
 _NOTHING_SAVED = 6  # exit code
-_MOST_PLACES = 5  # that are named
-_MOST_CYCLES = 10_000_000  # that a sidecar may state
+_MOST_PLACES = 5  # damaged places that are printed
+_MOST_CYCLES = 10_000_000  # largest count accepted from a sidecar
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `recover_file`."""
+    """Declare the options of `recover`."""
     parser.add_argument(
         "files",
         nargs="+",
@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Recover every file and return the exit code."""
+    """Recover every file; returns the exit code."""
     import json
 
     from acquisition.errors import TrialFileError
@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
             results[-1]["reason"] = error.reason
         else:
             obstacle = obstacle_to_analysis(recovery)
-            _tell(recovery, obstacle, console)
+            _print_recovery(recovery, obstacle, console)
             results.append(_plain(recovery, obstacle))
     failed = sum(result["state"] in {"failed", "copied"} for result in results)
     if len(sources) > 1:
@@ -67,14 +67,14 @@ def run(args: argparse.Namespace) -> int:
 
 
 def obstacle_to_analysis(recovery: Recovery) -> str:
-    """Return what the analysis needs of a trial and its copy has lost; empty = none."""
+    """Return the content that the analysis needs and the copy lacks; empty = none."""
     from analysis.data.load import ATTACHMENTS
 
     return ", ".join(n for n in recovery.missing_attachments if n in ATTACHMENTS)
 
 
 def _plain(recovery: Recovery, obstacle: str) -> dict[str, object]:
-    """Return what became of a file, for a program."""
+    """Return the result of a recovery as plain values."""
     if obstacle:
         state = "copied"
     elif recovery.path == recovery.source:
@@ -100,10 +100,10 @@ def _plain(recovery: Recovery, obstacle: str) -> dict[str, object]:
 
 
 def find_sources(names: list[str]) -> list[Path]:
-    """Return the files that `names` mean, each once, in order.
+    """Return the files that match `names`, each once, in order.
 
     Raises:
-        SettingsError: a name means no file.
+        SettingsError: a name matches no file.
     """
     from acquisition.errors import SettingsError
 
@@ -126,41 +126,41 @@ def find_sources(names: list[str]) -> list[Path]:
 
 
 def _matching(pattern: Path) -> list[Path]:
-    """Return the files a quoted pattern means; the shell expands the others."""
+    """Return the files that match a quoted pattern; the shell expands the others."""
     if not any(sign in str(pattern) for sign in "*?["):
         return []
     relative = pattern.relative_to(pattern.anchor)
     return sorted(p for p in Path(pattern.anchor).glob(str(relative)) if p.is_file())
 
 
-def _tell(recovery: Recovery, obstacle: str, console: Console) -> None:
+def _print_recovery(recovery: Recovery, obstacle: str, console: Console) -> None:
     from experiments.operator.console import GOOD, WARNING
 
     source, verified = recovery.source, recovery.verified
-    held = f"{verified.cycles} cycles, {recovery.messages} messages"
+    content = f"{verified.cycles} cycles, {recovery.messages} messages"
     if verified.cycles:
-        held = f"{verified.duration:.2f} s, {held}"
+        content = f"{verified.duration:.2f} s, {content}"
     if recovery.path == source:
         kind = "complete" if verified.is_complete else "sound, though incomplete"
         lacks = ", ".join(recovery.missing_attachments)
         if obstacle:
             console.problem(
-                f"{WARNING} {source}: is {kind} ({held}), but it cannot be analysed: "
-                f"it lacks {lacks}."
+                f"{WARNING} {source}: is {kind} ({content}), but it cannot be "
+                f"analysed: it lacks {lacks}."
             )
             return
-        console.say(f"{GOOD} {source}: is {kind}, nothing to recover ({held}).")
+        console.say(f"{GOOD} {source}: is {kind}, nothing to recover ({content}).")
         if lacks:
             console.say(f"{WARNING} It lacks {lacks}.")
         return
     verb = "saved" if recovery.is_new else "was recovered before,"
     if obstacle:
         console.problem(
-            f"{WARNING} {source}: copied {held} -> {recovery.path.name}, but it "
+            f"{WARNING} {source}: copied {content} -> {recovery.path.name}, but it "
             f"cannot be analysed: it lacks {obstacle}."
         )
     else:
-        saved = f"{verb} {held} -> {recovery.path.name}, read-only."
+        saved = f"{verb} {content} -> {recovery.path.name}, read-only."
         console.say(f"{GOOD} {source}: {saved}")
     console.say(f"{WARNING} It {recovery.reason}. {lost_text(recovery)}")
     if recovery.is_doubtful:
@@ -173,9 +173,9 @@ def _tell(recovery: Recovery, obstacle: str, console: Console) -> None:
 
 
 def missing_text(recovery: Recovery) -> str:
-    """Return what a file lacks of the recording in its sidecar; empty for nothing.
+    """Describe the cycles missing against the sidecar; empty for none.
 
-    A copy that was cut off does not show by itself how much is missing.
+    A truncated copy does not show by itself how much is missing.
     """
     from experiments.session.data_files import read_json
 
@@ -195,7 +195,7 @@ def missing_text(recovery: Recovery) -> str:
 
 
 def lost_text(recovery: Recovery) -> str:
-    """Return what was lost in words, for the operator."""
+    """Describe the losses of a recovery."""
     parts: list[str] = []
     if recovery.bytes_dropped:
         parts.append(f"{recovery.bytes_dropped} bytes")

@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Record the trial and return the exit code."""
+    """Record the trial; returns the exit code."""
     from acquisition.errors import SessionError
     from experiments.run.resume import redo, resume_request
     from experiments.session.annotations import clean_text, parse_trial

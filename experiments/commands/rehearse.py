@@ -1,4 +1,4 @@
-"""traction rehearse: the whole study simulated, analysed and held to its bands."""
+"""traction rehearse: simulate and analyse the whole study, check its bands."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Record, analyse and judge; return 6 if a band is not met."""
+    """Record, analyse and judge; returns 6 if a band is not met."""
     import json
 
     from experiments.operator.console import Console
@@ -97,8 +97,8 @@ def _print(
     summary = f"{len(results) - len(failed)} of {len(results)} bands met"
     console.say(f"{summary}. {folder / 'bands.json'}")
     deciding = [f.band.id for f in gated(plan, results) if f.band.id in failed]
-    if beside := sorted(failed.difference(deciding)):
-        words = ", ".join(beside)
+    if undecided := sorted(failed.difference(deciding)):
+        words = ", ".join(undecided)
         console.say(f"Outside: {words}; not gated at friction {plan.friction:g}.")
     if not deciding:
         return 0
@@ -107,7 +107,7 @@ def _print(
 
 
 def _free_folder(data: Path, seed: int) -> Path:
-    """Return a folder below `data` that is not there yet."""
+    """Return a folder below `data` that does not exist yet."""
     number, folder = 1, data / f"rehearsal_{seed}"
     while folder.exists():
         number += 1

@@ -1,4 +1,4 @@
-"""traction replay: a trial shown again, or a bus log in words."""
+"""traction replay: play back a trial, or decode a bus log."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ EXAMPLES = """\
   traction replay --can bus.log --summary   a bus log, totals only"""
 
 _LEFT_OUT = 6  # exit code
-_MOST_TOLD = 5  # malformed lines
+_MOST_REPORTED = 5  # malformed lines
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Show a trial or a bus log and return the exit code."""
+    """Show a trial or a bus log; returns the exit code."""
     from acquisition.errors import SettingsError
 
     is_trial = args.session is not None and args.trial is not None
@@ -118,23 +118,23 @@ def _show_log(args: argparse.Namespace) -> int:
     start_ns: int | None = None
     malformed = 0
 
-    def leave_out(error: CanLogError) -> None:
+    def report_malformed(error: CanLogError) -> None:
         nonlocal malformed
         malformed += 1
-        if malformed <= _MOST_TOLD:
+        if malformed <= _MOST_REPORTED:
             console.problem(str(error))
 
-    def tell(spoken: list[DecodedLine]) -> None:
+    def print_lines(lines: list[DecodedLine]) -> None:
         if args.summary:
             return
-        for line in spoken:
+        for line in lines:
             console.say(f"{(line.utc_ns - (start_ns or 0)) / 1e9:12.6f}  {line.text}")
 
     try:
         with args.can.open(encoding="utf-8-sig", errors="replace") as file:
-            for frame in parse_log(read_lines(file), leave_out):
+            for frame in parse_log(read_lines(file), report_malformed):
                 start_ns = frame.utc_ns if start_ns is None else start_ns
-                tell(reader.read(frame))
+                print_lines(reader.read(frame))
                 if console.is_lost:
                     return 0
     except OSError as error:
@@ -142,14 +142,14 @@ def _show_log(args: argparse.Namespace) -> int:
             f"{args.can} cannot be read: {error.strerror or error}.",
             hint="Name a file that --can-log wrote.",
         ) from error
-    tell(reader.finish())
-    _sum_up(reader.tally, console)
+    print_lines(reader.finish())
+    _print_summary(reader.tally, console)
     if malformed:
         console.problem(f"{malformed} malformed lines were left out.")
     return _LEFT_OUT if malformed else 0
 
 
-def _sum_up(tally: BusSummary, console: Console) -> None:
+def _print_summary(tally: BusSummary, console: Console) -> None:
     silent = sum(tally.silent.values())
     console.say(
         f"{tally.frames} frames, {tally.foreign} of other kinds. {tally.questions} "

@@ -62,8 +62,8 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _tell_up_to_date(record: ReportRecord, args: argparse.Namespace) -> None:
-    """Say where the report is, and what it leaves out."""
+def _print_up_to_date(record: ReportRecord, args: argparse.Namespace) -> None:
+    """Print the path of the report and its omissions."""
     from experiments.operator.console import WARNING, Console
 
     console = Console(color=not args.no_color)
@@ -74,7 +74,7 @@ def _tell_up_to_date(record: ReportRecord, args: argparse.Namespace) -> None:
 
 
 def _record(args: argparse.Namespace) -> ReportRecord:
-    """Return what the report follows from, as it is now."""
+    """Return the record of the report's present inputs."""
     from experiments.report.choices import choose_sessions
     from experiments.report.up_to_date import record_of
     from experiments.settings.load import load_settings
@@ -83,13 +83,19 @@ def _record(args: argparse.Namespace) -> ReportRecord:
     sessions = choose_sessions(data, args.sessions, every=args.all)
     order = [row.name for row in load_settings(args.config).matrix.terrains]
     own = sessions[0].path if len(sessions) == 1 else data / "study"
-    others = {"config", "data", "json", "no_color", "run"}  # what they name is compared
+    others = {
+        "config",
+        "data",
+        "json",
+        "no_color",
+        "run",
+    }  # compared by content instead
     options = {name: value for name, value in vars(args).items() if name not in others}
     return record_of(sessions, args.to or data, args.to or own, (options, order))
 
 
 def _left_out(out: Path) -> list[str]:
-    """Return the recordings that a report leaves out, and why."""
+    """Return the recordings omitted from a report, with reasons."""
     import json
 
     return json.loads((out / "fits.json").read_bytes())["left_out"]
@@ -109,9 +115,9 @@ def _report(args: argparse.Namespace) -> None:
     from experiments.settings.load import load_settings
 
     choices = analysis_choices(args)
-    record = _record(args)  # as the data are now, before they are read
+    record = _record(args)  # before the data are read
     if not args.json and record.is_current():
-        _tell_up_to_date(record, args)
+        _print_up_to_date(record, args)
         return
     console = PageRecorder() if args.json else Console(color=not args.no_color)
     data = Path(args.data)
@@ -140,7 +146,7 @@ def _report(args: argparse.Namespace) -> None:
 
 
 def _is_kept(data: Path, to: Path | None) -> bool:
-    """Whether results have been kept since the last trial was recorded."""
+    """Return whether results have been stored since the last recorded trial."""
     from experiments.session.store import FOLDS
 
     results, trials = [(to or data) / FOLDS], data.glob("sessions/*/trials")
@@ -152,7 +158,7 @@ def _is_kept(data: Path, to: Path | None) -> bool:
 
 
 def _as_json(page: Path, sessions: list[str], missing: list[str]) -> str:
-    """Return what a report has made, with the errors of its models, for a program."""
+    """Return the results of a report as JSON, with the errors of its models."""
     import json
 
     fits = page.parent.parent / "fits.json"

@@ -15,7 +15,7 @@ EXAMPLES = """\
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `resume_session`."""
+    """Declare the options of `resume`."""
     parser.add_argument(
         "session", nargs="?", metavar="SESSION", help="S012, a folder, or left out"
     )
@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Record what is missing and return the exit code."""
+    """Record the missing trials; returns the exit code."""
     from experiments.run.resume import resume_request, resume_session
     from experiments.session.store import find_session
 
@@ -35,10 +35,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _only_one(data: Path, *, is_fake: bool) -> "SessionFolder":
-    """Return the one unfinished session below `data`.
+    """Return the only unfinished session below `data`.
 
     Raises:
-        SessionError: there is none, or more than one, or it is open elsewhere.
+        SessionError: there is none, or several, or it is open elsewhere.
     """
     from acquisition.errors import SessionError
     from experiments.session.lock import locked_error, owner_of

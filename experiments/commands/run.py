@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run one session and return the exit code."""
+    """Run one session; returns the exit code."""
     from experiments.operator.console import Console
     from experiments.operator.scripted import choose_operator
     from experiments.rig.rig import FakeOptions
@@ -65,16 +65,18 @@ def run(args: argparse.Namespace) -> int:
         faults=tuple(args.fault),
         can_log=args.can_log,
     )
-    unfinished = _make_room(request, is_new=args.new)
+    unfinished = _resolve_unfinished(request, is_new=args.new)
     if unfinished is not None:
         return resume_session(unfinished.folder, _as_reopening(args, request))
     trials = args.trials or request.row.trials
-    asked = {"terrain": request.row.name, "trials": trials}
-    return run_session(request, OpenMode(Event.STARTED, asked))
+    fields = {"terrain": request.row.name, "trials": trials}
+    return run_session(request, OpenMode(Event.STARTED, fields))
 
 
-def _make_room(request: SessionRequest, *, is_new: bool) -> UnfinishedSession | None:
-    """Return the session to be resumed instead, None when none is in the way."""
+def _resolve_unfinished(
+    request: SessionRequest, *, is_new: bool
+) -> UnfinishedSession | None:
+    """Ask about unfinished sessions; returns the one to resume, or None."""
     from experiments.run.resume import ResumeChoice, choose_resume, close
     from experiments.session.unfinished import find_unfinished
 

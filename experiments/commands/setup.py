@@ -1,4 +1,4 @@
-"""traction setup: what the computer at the arm needs, printed or installed."""
+"""traction setup: print or install system files for the computer at the arm."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print or install what the computer needs; return the exit code."""
+    """Print or install the system files; returns the exit code."""
     from acquisition.errors import SettingsError
     from experiments.operator.console import GOOD, WARNING, Console
     from experiments.preflight.host_setup import SENSOR_LINK, install, run_all
@@ -92,12 +92,12 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _port_of(settings: Settings) -> str | None:
-    """Return the serial port of the sensor; None for one without."""
+    """Return the serial port of the sensor, or None."""
     return getattr(settings.rig.ft_sensor, "port", None)
 
 
 def _setup_of(args: argparse.Namespace, settings: Settings) -> HostSetup:
-    """Return what this computer needs for the rig of the settings."""
+    """Return the setup of this computer for the rig of the settings."""
     import getpass
     import os
 

@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the table, counted from files whose checksum is right."""
+    """Print the table, counted from files with the right checksum."""
     from experiments.operator.console import Console
     from experiments.session.status_table import (
         count_rows,
@@ -69,20 +69,20 @@ def run(args: argparse.Namespace) -> int:
     def look() -> StatusTable:
         seen = see_sessions(args.data, where, digest)
         lines = count_rows(seen, matrix, where)
-        known = [s.folder for s in seen]
+        folders = [s.folder for s in seen]
         terrains = {row.name for row in matrix.terrains}
         kinds = {line.is_simulated for line in lines if line.sessions} or {False}
         steps: list[str] = []
         for kind in sorted(kinds):
             steps += next_steps(args.data, seen, matrix, where, is_simulated=kind)
-        notes = table_notes(args.data, known, terrains, where, lines)
+        notes = table_notes(args.data, folders, terrains, where, lines)
         return StatusTable(lines, notes, steps, find_deviations(seen, where))
 
     if where:
         seen = glance_sessions(args.data)
-        known = [facts_of_row(row) for row in matrix.terrains]
-        known += [s.facts | recorded_facts(s.folder, where) for s in seen]
-        check_values(where, [*known, {"kind": "live"}, {"kind": "simulated"}])
+        facts = [facts_of_row(row) for row in matrix.terrains]
+        facts += [s.facts | recorded_facts(s.folder, where) for s in seen]
+        check_values(where, [*facts, {"kind": "live"}, {"kind": "simulated"}])
     if args.follow:
         return _follow(lambda: look().plain(), console)
     code = _show(look(), console, is_json=args.json)
@@ -92,12 +92,12 @@ def run(args: argparse.Namespace) -> int:
 
 @dataclass(frozen=True, slots=True)
 class StatusTable:
-    """Everything that one look at the sessions has to tell.
+    """Content of the status table.
 
     Attributes:
-        lines: the terrains.
-        notes: why there is less than somebody may expect.
-        steps: what comes next.
+        lines: rows of the terrains.
+        notes: reasons for missing rows or sessions.
+        steps: next steps.
         deviations: kept trials that are missing or changed.
     """
 
@@ -121,14 +121,14 @@ def table_notes(
     where: Where,
     lines: Sequence[object],
 ) -> list[str]:
-    """Return why the table shows less than somebody may expect, a line for each reason.
+    """Return a line for each reason why sessions or terrains are missing.
 
     Args:
         data: the data folder.
         known: its sessions.
-        terrains: names of those of the matrix.
-        where: the conditions that it was counted with.
-        lines: of the table.
+        terrains: names of the terrains of the matrix.
+        where: conditions of the table.
+        lines: rows of the table.
     """
     from acquisition.trial_file.data_files import list_folder
     from experiments.session.store import JOURNAL_FILE
@@ -158,10 +158,10 @@ def table_notes(
 
 
 def _show(table: StatusTable, console: Console, *, is_json: bool) -> int:
-    """Print what was seen; return the exit code."""
+    """Print the table; returns the exit code."""
     from experiments.operator.console import BAD
 
-    for note in table.notes:  # not in the way of a program that reads it
+    for note in table.notes:  # to stderr: stdout may be read by a program
         console.problem(note)
     if is_json:
         console.say(json.dumps([line.as_dict() for line in table.lines], indent=1))
@@ -175,7 +175,7 @@ def _show(table: StatusTable, console: Console, *, is_json: bool) -> int:
 
 
 def _factors(args: argparse.Namespace, matrix: MatrixSettings) -> list[str]:
-    """Return the factors of the matrix, and of recorded sessions where one is asked."""
+    """Return the factors of the matrix, and of sessions if conditions name one."""
     from experiments.session.store import list_sessions
     from experiments.session.summaries import recorded_factors
 
@@ -198,7 +198,7 @@ def _row(line: MatrixRow) -> tuple[str, ...]:
 
 
 def _follow(look: Callable[[], list[str]], console: Console) -> int:
-    """Show what `look` returns whenever it has changed, until Ctrl-C."""
+    """Show the lines of `look` whenever they change, until Ctrl-C."""
     from acquisition.clock import SystemClock
 
     clock = SystemClock()

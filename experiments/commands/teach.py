@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Lead through the touches and write the place; return the exit code."""
+    """Guide through the touches and write the place; returns the exit code."""
     from acquisition.errors import SettingsError
     from experiments.calibration.calibration import CalibrationContext, calibrate
     from experiments.calibration.guiding import check_new, guide_person

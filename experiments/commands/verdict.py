@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Change the verdict; files and journal follow, the history is kept."""
+    """Change the verdict in the journal and the files; the history is kept."""
     from experiments.operator.console import Console
     from experiments.session.annotations import change_verdict
     from experiments.session.store import find_session

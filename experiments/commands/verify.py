@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Name every kept trial that is missing or changed; return the exit code."""
+    """Print every missing or changed kept trial; returns the exit code."""
     import json
     from dataclasses import asdict
 
@@ -74,11 +74,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _require_any(data: Path, sessions: list[SessionFolder]) -> None:
-    """Refuse to call it all well where nothing, or not all, was looked at.
+    """Refuse success if no session, or not every one, was verified.
 
     Raises:
         KeptDataError: a session was renamed.
-        SessionError: there is none.
+        SessionError: there is no session.
     """
     from acquisition.errors import SessionError
     from experiments.session.kept_files import KeptDataError
@@ -98,7 +98,7 @@ def _require_any(data: Path, sessions: list[SessionFolder]) -> None:
 
 
 def _verify_published(folders: list[Path], args: argparse.Namespace) -> int:
-    """Name every changed file of a publication; return the exit code."""
+    """Print every changed file of a publication; returns the exit code."""
     import json
     from dataclasses import asdict
 

@@ -1,4 +1,4 @@
-"""traction watch: the session that another process records, on a second screen."""
+"""traction watch: show a session of another process on a second screen."""
 
 import argparse
 
@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Serve what is recorded until Ctrl-C and return the exit code."""
+    """Serve recorded sessions until Ctrl-C; returns the exit code."""
     from acquisition.clock import SystemClock
     from experiments.commands.live.watching import watch
     from experiments.operator.console import Console

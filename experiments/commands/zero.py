@@ -1,4 +1,4 @@
-"""traction zero: tell the motor controllers that the arm stands at home."""
+"""traction zero: define the present position of the arm as home."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Define the home position after confirmation and return the exit code."""
+    """Define the home position after confirmation; returns the exit code."""
     from experiments.calibration.zero import define_home
     from experiments.operator.console import Console
     from experiments.preflight.connecting import connect_rig
@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _is_confirmed(console: Console) -> bool:
-    """Ask for the word itself: a stray Enter must not move the arm's zero."""
+    """Ask for the whole word: a stray Enter must not move the arm's zero."""
     from acquisition.errors import SettingsError
 
     if not sys.stdin.isatty():

@@ -1,6 +1,6 @@
-"""The first day of an arm, step by step, and the check of every day after it.
+"""Commissioning of an arm in steps C0 to C14, and the daily check.
 
-A step is a `Step` of its module, C0 to C14 in `procedure`; limits.toml has what each
-quantity may be, `evidence` what was measured and whether torque may be sent. Begin
+Each step is a `Step` in its module; `procedure` lists them, limits.toml has the
+limits, `evidence` the records and the decision whether torque may be sent. Begin
 with `procedure`.
 """

@@ -1,4 +1,4 @@
-"""C1 to C3: who is on the bus, what they say of themselves, and when."""
+"""C1 to C3: devices on the bus, their identity and the timing of their replies."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
@@ -29,16 +29,16 @@ from wam.driver.puck_properties import (
     shipped_table,
 )
 
-LISTENED = 10.0  # s
-_PORTION = 0.5  # s, between two looks at the screen
-ASKED = 3  # times that each device is asked for the same
-LOOPED = 60  # s
+LISTENED = 10.0  # s, duration of C1
+_PORTION = 0.5  # s, period of the progress bar
+ASKED = 3  # requests for the same property, to find duplicate nodes
+LOOPED = 60  # s, duration of the loop in C3
 IDLE_DEGREES = (10.0, 50.0)  # °C
-_SILENT = -(2**31)  # in the place of a property that was not told
+_SILENT = -(2**31)  # stands for a property without a reply
 
 
 def listen(rig: Rig, most: float = LISTENED) -> Iterator[tuple[float, Values]]:
-    """Ask for nothing for `most` [s]; yield the share done and what was heard."""
+    """Listen silently for `most` [s]; yields progress and the recording."""
     frames, seconds = 0, 0.0
     while seconds < most:
         heard = rig.backend.ask(Listen(_PORTION))
@@ -56,7 +56,7 @@ def listen(rig: Rig, most: float = LISTENED) -> Iterator[tuple[float, Values]]:
 
 
 def judge_silence(values: Values) -> Judgement:
-    """Judge what `listen` heard."""
+    """Judge a recording of `listen`."""
     master = int(values["master"])
     return judged(
         [
@@ -69,12 +69,11 @@ def judge_silence(values: Values) -> Judgement:
 
 
 def identify(rig: Rig, commissioned: Sequence[int | None] = ()) -> Values:
-    """Ask every device what it is, also one that the start refuses.
+    """Read the identity of every device, even if the start refuses it.
 
     Args:
-        rig: its bus is open.
-        commissioned: serial numbers of pucks 1 to 7 when it was last sound; () = it was
-            not.
+        rig: rig with an open bus.
+        commissioned: serial numbers of pucks 1 to 7 when C2 was last sound; () = never.
     """
     refusal, warnings, nodes = "", list[str](), list[int]()
     degrees = np.full((2, len(MOTOR_NODES)), np.nan)  # of pucks, of motors
@@ -82,8 +81,8 @@ def identify(rig: Rig, commissioned: Sequence[int | None] = ()) -> Values:
         info = rig.backend.ask(StartArm())
         warnings, nodes = list(info.warnings), list(info.nodes)
         for i, puck in enumerate(info.pucks):
-            told_of = (puck.health.puck_degc, puck.health.motor_degc)
-            degrees[:, i] = [np.nan if each is None else each for each in told_of]
+            reported = (puck.health.puck_degc, puck.health.motor_degc)
+            degrees[:, i] = [np.nan if value is None else value for value in reported]
     except TractionError as error:
         refusal = error.message
         if not isinstance(error, UnfitDeviceError):
@@ -92,31 +91,32 @@ def identify(rig: Rig, commissioned: Sequence[int | None] = ()) -> Values:
     names = sorted({name for answer in answers for name in answer})
     rows = [[answer.get(name) for name in names] for answer in answers]
     table = [[_SILENT if value is None else value for value in row] for row in rows]
-    counted = asdict(rig.backend.ask(CountAnswers(ASKED)))
+    reply_counts = asdict(rig.backend.ask(CountAnswers(ASKED)))
     return {
         "names": texts(names),
         "properties": np.array(table, dtype=np.int64).reshape(len(answers), len(names)),
         "nodes": np.array(nodes, dtype=np.int64),
-        "asked": np.array(counted["nodes"], dtype=np.int64),
-        "answers": np.array(counted["counts"], dtype=np.int64),
-        "differing": np.array(counted["differing"], dtype=np.int64),
+        "asked": np.array(reply_counts["nodes"], dtype=np.int64),
+        "answers": np.array(reply_counts["counts"], dtype=np.int64),
+        "differing": np.array(reply_counts["differing"], dtype=np.int64),
         "warnings": texts(warnings),
         "refusal": texts([refusal] if refusal else []),
         "degrees": degrees,
         "expected": texts([_expected(rig)]),
         "commissioned": np.array(
-            [_SILENT if each is None else each for each in commissioned], dtype=np.int64
+            [_SILENT if serial is None else serial for serial in commissioned],
+            dtype=np.int64,
         ),
     }
 
 
 def _expected(rig: Rig) -> str:
-    """Return the table of this arm, "" for that of the factory."""
+    """Return the property table of this arm, "" for the factory's."""
     return "" if rig.is_simulated else read_properties(rig.settings)
 
 
 def told(values: Values) -> dict[str, list[int | None]]:
-    """Return by name what the seven pucks said; None = nothing."""
+    """Return the properties of the seven pucks by name; None = no reply."""
     rows = values["properties"].tolist()
     return {
         name: [None if row[i] == _SILENT else int(row[i]) for row in rows]
@@ -125,28 +125,28 @@ def told(values: Values) -> dict[str, list[int | None]]:
 
 
 def serials_of(values: Values) -> list[int | None]:
-    """Return the serial numbers of pucks 1 to 7; [] = they were not asked."""
+    """Return the serial numbers of pucks 1 to 7; [] = not read."""
     return told(values).get("SN", [])
 
 
 def commissioned_with(values: Values) -> list[int | None]:
-    """Return the serial numbers that the arm had when it was last sound; [] = never."""
+    """Return the serial numbers when C2 was last sound; [] = never."""
     stored = values["commissioned"].tolist()
-    return [None if each == _SILENT else int(each) for each in stored]
+    return [None if serial == _SILENT else int(serial) for serial in stored]
 
 
 def _replaced(values: Values) -> list[str]:
-    """Return in words which pucks are not those that were commissioned."""
+    """Describe the pucks that were replaced since the commissioning."""
     pairs = zip(serials_of(values), commissioned_with(values), strict=False)
     return [
-        f"SN of puck {node} is {is_}, it was {was}"
-        for node, (is_, was) in enumerate(pairs, 1)
-        if None not in (is_, was) and is_ != was
+        f"SN of puck {node} is {now}, it was {before}"
+        for node, (now, before) in enumerate(pairs, 1)
+        if None not in (now, before) and now != before
     ]
 
 
 def _temperatures(values: Values) -> list[str]:
-    """Return in words which pucks and motors are not as warm as idle ones are."""
+    """Describe the pucks and motors outside the temperatures of idle ones."""
     low, high = IDLE_DEGREES
     return [
         f"{what} {node} has {degrees:.0f} °C, an idle one has {low:g} to {high:g}"
@@ -157,37 +157,39 @@ def _temperatures(values: Values) -> list[str]:
 
 
 def judge_identity(values: Values) -> Judgement:
-    """Judge what `identify` was told."""
+    """Judge a recording of `identify`."""
     counts = dict(
         zip(values["asked"].tolist(), values["answers"].tolist(), strict=True)
     )
     motors = [counts.get(node, 0) for node in MOTOR_NODES]
     properties = told(values)
     complete = len(values["properties"]) == len(MOTOR_NODES)
-    (text,) = words(values, "expected")
-    table = known_table(text, "[arm] properties") if text else shipped_table()
+    (table_text,) = words(values, "expected")
+    table = (
+        known_table(table_text, "[arm] properties") if table_text else shipped_table()
+    )
     differences = compare(table, properties) if complete else []
-    severe = [each.text for each in differences if not each.is_warning]
-    unkept = [each for each in words(values, "warnings") if "safety module" in each]
+    severe = [diff.text for diff in differences if not diff.is_warning]
+    ignored = [text for text in words(values, "warnings") if "safety module" in text]
     refusal, replaced = words(values, "refusal"), _replaced(values)
-    serials = [each for each in properties.get("SN", []) if each is not None]
+    serials = [serial for serial in properties.get("SN", []) if serial is not None]
     rows = [
         found("module", int(counts.get(SAFETY_NODE, 0) > 0)),
         found("nodes", sum(count > 0 for count in motors)),
         found("twice", max(*counts.values(), 0)),
         found("properties", len(severe), text="; ".join(severe)),
         found("replaced", len(replaced), text="; ".join(replaced)),
-        found("module_limits", len(unkept), text=" ".join(unkept)),
+        found("module_limits", len(ignored), text=" ".join(ignored)),
         found("refused", len(refusal), text=" ".join(refusal)),
     ]
     if complete and len(serials) == len(MOTOR_NODES):
         rows.append(found("serials", len(set(serials))))
-    advice = [each.text for each in differences if each.is_warning]
+    advice = [diff.text for diff in differences if diff.is_warning]
     return judged(rows, [*advice, *_temperatures(values)])
 
 
 def time_replies(rig: Rig) -> Iterator[tuple[float, Values]]:
-    """Ask for positions, leave questions out, then let the loop run, the arm idle."""
+    """Time position requests, omit some, then run the loop with the arm idle."""
     measured = rig.backend.ask(MeasureExchange())
     rig.backend.ask(OpenSensor())
     rig.backend.begin()
@@ -215,7 +217,7 @@ def time_replies(rig: Rig) -> Iterator[tuple[float, Values]]:
 
 
 def judge_timing(values: Values) -> Judgement:
-    """Judge what `time_replies` measured."""
+    """Judge a recording of `time_replies`."""
     return judged(
         [
             found("answered", number(values, "unasked")),

@@ -1,4 +1,4 @@
-"""C5: every joint turned by hand from stop to stop, the arm idle."""
+"""C5: every joint turned manually from stop to stop, the arm idle."""
 
 import numpy as np
 
@@ -9,10 +9,10 @@ from experiments.commissioning.scene import Scene
 from experiments.commissioning.step import Step
 from wam.model.constants import Array
 
-# Where the arm is before its joints are turned [rad]: nothing is in the way of one.
+# Initial pose [rad], in which every joint can be turned freely.
 POSE = (0.0, -0.6, 0.0, 2.0, 0.0, 0.0, 0.0)
-CARRIED = 4.0  # s, a simulated hand takes from pose to pose
-_LOW_WORDS = {  # the way to the stop of the smaller angle
+CARRIED = 4.0  # s, travel time of a simulated hand from pose to pose
+_LOW_WORDS = {  # direction to the stop of the smaller angle
     1: "clockwise, seen from above",
     2: "backwards, over the base",
     3: "clockwise about the upper arm, seen from the elbow",
@@ -22,12 +22,12 @@ _LOW_WORDS = {  # the way to the stop of the smaller angle
     7: "clockwise about the foot's axis, seen from the foot",
 }
 _HIGH_WORDS = {4: "until the forearm is folded onto the upper arm"}
-_OTHER_WAY = "the other way, onto the stop there"
-_MEANT = 0.3  # s, of positions that are averaged
+_REVERSED = "the other way, onto the stop there"
+_AVERAGE = 0.3  # s, averaging time of positions
 
 
 def collect(scene: Scene) -> Values:
-    """Have each joint turned onto both stops; return where all joints were told to be.
+    """Have each joint turned onto both stops; returns all measured positions.
 
     Raises:
         ArmFaultError, StopRequestedError: as `ConsoleLoop.tick`.
@@ -51,7 +51,7 @@ def collect(scene: Scene) -> Values:
             scene.simulation.turn_to_stop(joint, "low")
             scene.await_hand()
         lows.append(_mean(scene))
-        words = _HIGH_WORDS.get(joint, _OTHER_WAY)
+        words = _HIGH_WORDS.get(joint, _REVERSED)
         scene.ask(f"Joint {joint} {words}. [space] while it is there.")
         if scene.simulation is not None:
             scene.simulation.turn_to_stop(joint, "high")
@@ -61,19 +61,19 @@ def collect(scene: Scene) -> Values:
     return {
         "low": np.array(lows),
         "high": np.array(highs),
-        # Joints 2 and 4 lie on a stop at home, beyond the ends of the drawings.
+        # Joints 2 and 4 lie on a stop at home, beyond the limits of the drawings.
         "q_lower": np.minimum(constants.q_lower, constants.home),
         "q_upper": np.maximum(constants.q_upper, constants.home),
     }
 
 
 def _mean(scene: Scene) -> Array:
-    scene.wait(_MEANT)
-    return scene.loop_client.last(_MEANT)["position"].mean(axis=0)
+    scene.wait(_AVERAGE)
+    return scene.loop_client.last(_AVERAGE)["position"].mean(axis=0)
 
 
 def judge(values: Values) -> Judgement:
-    """Judge order, sense, scale and zero of every encoder."""
+    """Judge order, direction, scale and zero of every encoder."""
     lower, upper = values["q_lower"], values["q_upper"]
     low, high = values["low"], values["high"]
     rows: list[Found] = []
@@ -81,12 +81,14 @@ def judge(values: Values) -> Judgement:
         travel = high[i, i] - low[i, i]
         others = np.abs(high[i] - low[i])
         others[i] = 0.0
-        beside = int(others.argmax())
+        largest = int(others.argmax())
         off = max(low[i, i] - lower[i], high[i, i] - upper[i], key=abs)
         share = travel / (upper[i] - lower[i]) - 1.0
         rows += [
             found("sense", float(np.sign(travel)), joint=i + 1),
-            found("beside", np.degrees(others[beside]), joint=i + 1, other=beside + 1),
+            found(
+                "beside", np.degrees(others[largest]), joint=i + 1, other=largest + 1
+            ),
             found("travel", 100.0 * share, joint=i + 1),
             found("stop_angle", np.degrees(off), joint=i + 1),
         ]
@@ -94,7 +96,7 @@ def judge(values: Values) -> Judgement:
 
 
 def stop_errors(values: Values) -> Array:
-    """Return by how much the zero of each joint is off by its stops [rad], (7,)."""
+    """Zero errors of the joints from their stops [rad], shape (7,)."""
     low, high = np.diag(values["low"]), np.diag(values["high"])
     return ((low - values["q_lower"]) + (high - values["q_upper"])) / 2
 

@@ -1,4 +1,4 @@
-"""C0: are the numbers of rig.toml those of an arm that can be driven?"""
+"""C0: plausibility of rig.toml."""
 
 import numpy as np
 
@@ -10,23 +10,23 @@ from experiments.commissioning.step import Step
 
 
 def collect(scene: Scene) -> Values:
-    """Return what the settings say."""
+    """Collect unusual settings, load, and difference of the gravity models."""
     rig = scene.rig
     tool = rig.model.tool
     assert tool is not None
-    apart = [
+    gravity_errors = [
         np.abs(rig.law_model.gravity(q) - rig.model.gravity(q)).max()
         for q in rig.model.constants.calibration_poses
     ]
     return {
         "unusual": texts(rig.settings.unusual()),
         "load": np.array(tool.foot.mass + tool.sensor.mass),
-        "gravity_apart": np.array(apart),
+        "gravity_apart": np.array(gravity_errors),
     }
 
 
 def judge(values: Values) -> Judgement:
-    """Judge what `collect` returned."""
+    """Judge a recording of `collect`."""
     unusual = words(values, "unusual")
     return judged(
         [

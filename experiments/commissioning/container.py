@@ -1,7 +1,7 @@
-"""C13: the container as touched against the row of the matrix, arm afloat.
+"""C13: the touched container compared with the row of the matrix, arm floating.
 
-The first step in which a person drives the foot under gravity compensation: it needs
-what C0 to C11 prove.
+The first step in which a person leads the foot under gravity compensation: it
+requires C0 to C11.
 """
 
 from dataclasses import asdict
@@ -20,7 +20,7 @@ from ft_sensor.calibration.fit import fit_terrain
 
 
 def collect(scene: Scene) -> Values:
-    """Have the corners touched; return the points and what the matrix says of them.
+    """Have the corners touched; returns the points and the row's frame.
 
     Raises:
         PreflightError: not activated.
@@ -38,14 +38,14 @@ def collect(scene: Scene) -> Values:
 
 
 def judge(values: Values) -> Judgement:
-    """Judge what was touched against the row that a session on it takes."""
+    """Judge the touched container against the row of the matrix."""
     try:
         fit = fit_terrain(values["points"])
     except SettingsError as error:
         return judged([found("corners", 0.0, text=error.message)])
     touched, far_end = fit.frame, values["far_end"]
-    apart = touched.heading - number(values, "heading")
-    turned = (apart + np.pi) % (2.0 * np.pi) - np.pi
+    difference = touched.heading - number(values, "heading")
+    turned = (difference + np.pi) % (2.0 * np.pi) - np.pi
     tilted = touched.incline - number(values, "incline")
     away = float(np.linalg.norm(np.subtract(touched.far_end, far_end)))
     return judged(

@@ -1,10 +1,10 @@
-"""The check of every day: is the arm still the one that was commissioned?
+"""Daily check: is the arm unchanged since its commissioning?
 
-Bus, pucks and replies first, then the foot's weight in four poses held by hand: in one
-the sensor's bias would hide it, and two readings differ by 6 degrees of it anyway. The
-first activation of the day is that of an arm that lies on its stops without torque;
-then joints 2 and 4 are lifted off them. What they need says more of motors, cables and
-drives than anything that can be seen with the arm idle.
+First bus, pucks and replies, then the foot's weight in four manually held poses: the
+sensor's bias hides it in a single pose, and two readings differ by 6 degrees anyway.
+The first activation of the day is without torque, the arm lying on its stops; then
+joints 2 and 4 are lifted off. The torque they need reveals more about motors, cables
+and drives than any test of an idle arm.
 """
 
 from collections.abc import Mapping
@@ -43,11 +43,11 @@ from experiments.rig.requests import MeasureExchange, StartArm
 from wam.model.arm_model import ArmModel
 from wam.model.constants import Array, load_constants
 
-HANGING = (0, 2, 3, 4)  # of POSES: the foot down, to both sides, ahead
-LIFTED = (2, -4)  # joints, with the sense in which they are lifted
-_LISTENED = 2.0  # s
-_DEVICES = ("pucks", "motors", "module", "sensor")  # of `BASES`
-_WAY_BACK = (
+HANGING = (0, 2, 3, 4)  # indices of POSES: foot down, to both sides, ahead
+LIFTED = (2, -4)  # joints, signed by the direction of the lift
+_LISTENED = 2.0  # s, duration of silent listening
+_DEVICES = ("pucks", "motors", "module", "sensor")  # keys of `BASES`
+_REMEDY = (
     "Look at what is named. What changed for good is commissioned again, from the step "
     "that measures it: traction commission --from STEP."
 )
@@ -56,17 +56,17 @@ _WAY_BACK = (
 def do_daily(
     scene: Scene, files: RecordFolder, operator: str, *, is_simulated: bool
 ) -> DailyCheck:
-    """Do the check, write what came of it and return that.
+    """Run the daily check, write its result to the history and return it.
 
     Args:
         scene: the rig and the terminal.
-        files: the commissioning that it is compared with.
-        operator: who does it.
-        is_simulated: the arm is.
+        files: the commissioning to compare with.
+        operator: name of the operator.
+        is_simulated: whether the arm is simulated.
 
     Raises:
         SettingsError: the arm was not commissioned as far as C9.
-        PreflightError: the arm is not fit, or a person did not do what was asked.
+        PreflightError: the arm is not fit, or a person did not follow a prompt.
         StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
     """
     reference = reference_of(files)
@@ -90,7 +90,7 @@ def do_daily(
 
 
 def reference_of(files: RecordFolder) -> Values:
-    """Return what the commissioning measured of what is looked at every day.
+    """Return the reference values of the daily check from the commissioning.
 
     Raises:
         SettingsError: C6 or C9 was not done, or its recording is missing.
@@ -113,13 +113,13 @@ def reference_of(files: RecordFolder) -> Values:
 
 
 def collect(scene: Scene, files: RecordFolder, reference: Values) -> Values:
-    """Return what was recorded; it ends with what does not let it go on.
+    """Record the daily check; a contradiction ends it before the activation.
 
     Raises:
         PreflightError, StopRequestedError, ArmFaultError: as `do_daily`.
     """
     scene.say("Daily check, about 2 min   [q]uit. The arm is idle: support it.")
-    heard = _heard(scene)
+    heard = _listen(scene)
     scene.rig.backend.ask(StartArm())
     times = scene.rig.backend.ask(MeasureExchange())
     scene.start()
@@ -129,30 +129,30 @@ def collect(scene: Scene, files: RecordFolder, reference: Values) -> Values:
         require(lacks(files.record, scene.inputs(), _now(scene)))
     if not scene.info.is_zeroed:
         raise preflight_error("not-zeroed")
-    off = zero_errors(scene.rig, scene.info)
+    zero = zero_errors(scene.rig, scene.info)
     held = _hang(scene, reference)
     values: dict[str, NDArray[Any]] = {
-        **{f"heard_{name}": each for name, each in heard.items()},
+        **{f"heard_{name}": value for name, value in heard.items()},
         "replies_ns": np.array(times.replies_ns, dtype=np.int64),
         "unasked": np.array(times.unasked),
         "late": np.array(times.late),
         "answer_ns": np.array(times.answer_ns),
         "changed": np.array(changed, dtype=np.str_),
-        "zero": np.zeros(0) if off is None else off,
+        "zero": np.zeros(0) if zero is None else zero,
         **held,
-        **{f"reference_{name}": each for name, each in reference.items()},
+        **{f"reference_{name}": value for name, value in reference.items()},
     }
     if judge(values).cause:
         return values  # nothing is activated after a contradiction
     rest = rest_pose.rest(scene)
-    values |= {f"rest_{name}": each for name, each in rest.items()}
+    values |= {f"rest_{name}": value for name, value in rest.items()}
     if not rest_pose.judge_rest(rest).cause:
         ramps = rest_pose.ramps(scene, LIFTED)
-        values |= {f"ramp_{name}": each for name, each in ramps.items()}
+        values |= {f"ramp_{name}": value for name, value in ramps.items()}
     return values
 
 
-def _heard(scene: Scene) -> Values:
+def _listen(scene: Scene) -> Values:
     values: Values = {}
     for share, values in listen(scene.rig, _LISTENED):  # noqa: B007
         scene.show_share(share, "listening, nothing is sent")
@@ -160,10 +160,10 @@ def _heard(scene: Scene) -> Values:
 
 
 def _hang(scene: Scene, reference: Values) -> Values:
-    """Have the foot held in four poses; return joints, readings, what is believed.
+    """Have the foot held in four poses; returns joints, readings and settings.
 
-    The sensor's drift alone looks like another weight on one day in thirty: what does
-    not fit is held once more, and then all eight are judged together.
+    The sensor's drift alone looks like another weight on one day in thirty: poses
+    that do not fit are repeated, and all eight are judged together.
     """
     payload = scene.rig.payload
     believed = {"sign": np.array(payload.sign), "mounting": payload.rotation}
@@ -171,7 +171,7 @@ def _hang(scene: Scene, reference: Values) -> Values:
     parts: list[tuple[Array, Array]] = []
     for is_again in (False, True):
         if is_again:
-            scene.say("The foot's weight is beside the commissioning's: once more.")
+            scene.say("The foot's weight differs from the commissioning's: once more.")
         for k, at in enumerate(HANGING, 1):
             bring(scene, POSES[at], f"pose {k} of {len(HANGING)}")
             parts.append(measure(scene))
@@ -180,7 +180,7 @@ def _hang(scene: Scene, reference: Values) -> Values:
             "readings": np.array([reading for _, reading in parts]),
             **believed,
         }
-        if all(row.measured.is_within for row in _hanging(held)):
+        if all(row.measured.is_within for row in _hanging_rows(held)):
             break
     return held
 
@@ -201,28 +201,28 @@ def judge(values: Values) -> Judgement:
     ]
     if values["zero"].size:
         rows.append(found("zero", np.degrees(np.abs(values["zero"]).max())))
-    rows += [*_hanging(values), *_lying(values)]
+    rows += [*_hanging_rows(values), *_lying_rows(values)]
     return judged(rows)
 
 
-def _hanging(values: Values) -> list[Found]:
-    """Judge the foot's weight beside the one that C6 fitted.
+def _hanging_rows(values: Values) -> list[Found]:
+    """Judge the foot's weight compared with the one that C6 fitted.
 
-    The sensor's bias is another one every day: it is fitted from pose to pose.
+    The sensor's bias changes from day to day: it is fitted over the poses.
     """
     weight = values["reference_weight"]
     R = orientations(values, ArmModel(load_constants()))
     loads = number(values, "sign") * values["readings"][:, :3]
-    left = loads - R.transpose(0, 2, 1) @ weight
-    left = left - left.mean(axis=0)
-    free = left.size - left.shape[1]
+    residuals = loads - R.transpose(0, 2, 1) @ weight
+    residuals = residuals - residuals.mean(axis=0)
+    degrees = residuals.size - residuals.shape[1]  # of freedom
     return [
-        found("hang_force", float(np.sqrt((left**2).sum() / free))),
+        found("hang_force", float(np.sqrt((residuals**2).sum() / degrees))),
         found("hang_way", angle(fit_foot(values).weight, weight)),
     ]
 
 
-def _lying(values: Values) -> list[Found]:
+def _lying_rows(values: Values) -> list[Found]:
     rest, ramp = _part(values, "rest_"), _part(values, "ramp_")
     if not rest:
         return []
@@ -243,14 +243,14 @@ def _lying(values: Values) -> list[Found]:
 
 def _part(values: Values, prefix: str) -> Values:
     return {
-        name.removeprefix(prefix): each
-        for name, each in values.items()
+        name.removeprefix(prefix): value
+        for name, value in values.items()
         if name.startswith(prefix)
     }
 
 
 def _changed(files: RecordFolder, present: Mapping[str, str]) -> list[str]:
-    """Return what says something else of itself than when it was commissioned."""
+    """Describe the devices whose identity has changed since the commissioning."""
     return [
         BASES[name].words
         for name in _DEVICES
@@ -262,15 +262,15 @@ def _changed(files: RecordFolder, present: Mapping[str, str]) -> list[str]:
 
 
 def _say(scene: Scene, judgement: Judgement) -> None:
-    """Say what came of it: a line each, and what to do where it failed."""
+    """Print the judgement, a line per quantity, with the remedy of a failure."""
     scene.console.end_panel()
-    for each in judgement.quantities:
-        if each.name.startswith(_SHOWN) or not each.is_within:
-            mark = GOOD if each.is_within else BAD
-            scene.console.check(mark, "daily", each.text)
+    for quantity in judgement.quantities:
+        if quantity.name.startswith(_SHOWN) or not quantity.is_within:
+            mark = GOOD if quantity.is_within else BAD
+            scene.console.check(mark, "daily", quantity.text)
     if judgement.cause:
         scene.console.check(BAD, "daily check", judgement.cause)
-        scene.console.say(f"   {_WAY_BACK}")
+        scene.console.say(f"   {_REMEDY}")
     else:
         scene.console.check(GOOD, "daily check", "the arm is as it was commissioned")
 

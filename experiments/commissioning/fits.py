@@ -1,9 +1,9 @@
-"""What the recordings of C6 and C7 tell of foot, sensor, base and joint zeros.
+"""Fits of the recordings of C6 and C7: foot, sensor, base and joint zeros.
 
-With s the sensor's sign and R the believed orientation of the sensor, a foot that
-weighs w in the base frame shows s f = b + R^T w and s n = b_n + c x R^T w: linear in
-bias, centre and weight. Differences with and without a known weight are free of all but
-that weight.
+With s the sensor's sign, R its nominal orientation and w the foot's weight in the base
+frame, the readings are s f = b + R^T w and s n = b_n + c x R^T w: linear in bias,
+centre and weight. Differences with and without a known weight depend on that weight
+only.
 """
 
 from dataclasses import dataclass
@@ -15,13 +15,13 @@ from ft_sensor.payload import cross_matrix
 from wam.model.arm_model import ArmModel
 from wam.model.constants import GRAVITY, Array, load_constants
 
-_PRIOR = np.radians(1.5)  # of each of the twelve angles
-_DIRECTION, _STOP = np.radians(1.0), np.radians(0.6)  # spreads of what is measured
-_STEP = 1e-6  # rad, of derivatives
+_PRIOR = np.radians(1.5)  # prior spread of each of the twelve angles
+_DIRECTION, _STOP = np.radians(1.0), np.radians(0.6)  # measurement spreads
+_STEP = 1e-6  # rad, step of numerical derivatives
 _ROUNDS = 6
 _DOWN = np.array([0.0, 0.0, -1.0])
 
-FITTED = (  # what the angles of `HungFit` are of
+FITTED = (  # names of the angles of `HungFit`
     *(f"the zero of joint {joint}" for joint in range(1, 8)),
     "the base about x",
     "the base about y",
@@ -33,16 +33,16 @@ FITTED = (  # what the angles of `HungFit` are of
 
 @dataclass(frozen=True, slots=True)
 class FootFit:
-    """The foot by its own weight.
+    """Fit of the foot's own weight.
 
     Attributes:
-        mass: of it [kg].
-        weight: of it in the base frame [N], shape (3,).
-        centre: of it in the sensor frame [m], shape (3,).
+        mass: mass of the foot [kg].
+        weight: weight in the base frame [N], shape (3,).
+        centre: centre of mass in the sensor frame [m], shape (3,).
         way: angle between its weight and down [degrees].
-        force_left: what no weight explains, rms of an axis [N].
-        moment_left: the same of moments [N m].
-        lever: how many times larger than forces moments are, from pose to pose [m].
+        force_left: rms residual of a force axis [N].
+        moment_left: rms residual of a moment axis [N m].
+        lever: ratio of moment to force variations between poses [m].
     """
 
     mass: float
@@ -56,13 +56,13 @@ class FootFit:
 
 @dataclass(frozen=True, slots=True)
 class HungFit:
-    """Sensor, sole and twelve angles by a known weight.
+    """Fit of a known weight: sensor, sole and twelve angles.
 
     Attributes:
-        scale: measured weight over the known one in each pose, shape (n,).
-        sole: where the string pulls in the sensor frame [m], shape (3,).
+        scale: measured over known weight in each pose, shape (n,).
+        sole: point of attack of the string in the sensor frame [m], shape (3,).
         way: angle between the weight and down, worst pose [degrees].
-        angles: what `FITTED` are off by [rad], shape (12,).
+        angles: errors of the angles `FITTED` [rad], shape (12,).
         worst: index of the largest angle.
     """
 
@@ -74,73 +74,75 @@ class HungFit:
 
 
 def fit_foot(values: Values) -> FootFit:
-    """Return the foot as the recording of C6 shows it."""
+    """Fit mass, weight and centre of the foot to a recording of C6."""
     R = orientations(values, ArmModel(load_constants()))
     loads = number(values, "sign") * values["readings"]
     count = len(R)
     rows = np.zeros((3 * count, 6))
     rows[:, :3] = np.tile(np.eye(3), (count, 1))
     rows[:, 3:] = R.transpose(0, 2, 1).reshape(-1, 3)
-    solved, *_ = np.linalg.lstsq(rows, loads[:, :3].ravel())
-    w: Array = solved[3:].astype(np.float64)
-    left = loads[:, :3].ravel() - rows @ solved
+    solution, *_ = np.linalg.lstsq(rows, loads[:, :3].ravel())
+    w: Array = solution[3:].astype(np.float64)
+    force_residuals = loads[:, :3].ravel() - rows @ solution
     arms = np.zeros((3 * count, 6))
     arms[:, :3] = np.tile(np.eye(3), (count, 1))
-    arms[:, 3:] = np.concatenate([cross_matrix(each.T @ w).T for each in R])
-    centred, *_ = np.linalg.lstsq(arms, loads[:, 3:].ravel())
-    twisted = loads[:, 3:].ravel() - arms @ centred
+    arms[:, 3:] = np.concatenate([cross_matrix(rotation.T @ w).T for rotation in R])
+    moment_solution, *_ = np.linalg.lstsq(arms, loads[:, 3:].ravel())
+    moment_residuals = loads[:, 3:].ravel() - arms @ moment_solution
     return FootFit(
         mass=float(np.linalg.norm(w)) / GRAVITY,
         weight=w,
-        centre=centred[3:].astype(np.float64),
+        centre=moment_solution[3:].astype(np.float64),
         way=angle(w, _DOWN),
-        force_left=_rms(left),
-        moment_left=_rms(twisted),
+        force_left=_rms(force_residuals),
+        moment_left=_rms(moment_residuals),
         lever=_lever(loads),
     )
 
 
 def fit_hung(values: Values) -> HungFit:
-    """Return sensor, sole and angles as the recording of C7 shows them."""
+    """Fit sensor, sole and angles to a recording of C7."""
     model = ArmModel(load_constants())
     R = orientations(values, model)
-    both = (values["before"] + values["after"]) / 2
-    loads = number(values, "sign") * (values["loaded"] - both)
+    unloaded = (values["before"] + values["after"]) / 2
+    loads = number(values, "sign") * (values["loaded"] - unloaded)
     forces = loads[:, :3]
-    ways = [angle(each @ force, _DOWN) for each, force in zip(R, forces, strict=True)]
+    tilts = [angle(turn @ force, _DOWN) for turn, force in zip(R, forces, strict=True)]
     arms = np.concatenate([cross_matrix(force).T for force in forces])
     sole, *_ = np.linalg.lstsq(arms, loads[:, 3:].ravel())
     angles = _fit_angles(values, forces, model)
     return HungFit(
         scale=np.linalg.norm(forces, axis=1) / (number(values, "hung") * GRAVITY),
         sole=sole.astype(np.float64),
-        way=max(ways),
+        way=max(tilts),
         angles=angles,
         worst=int(np.abs(angles).argmax()),
     )
 
 
 def orientations(values: Values, model: ArmModel) -> Array:
-    """Return the believed orientations of the sensor in the base, (n, 3, 3)."""
-    turned = [model.plate_pose(q)[1] @ values["mounting"] for q in values["q"]]
-    return np.array(turned)
+    """Nominal orientations of the sensor in the base frame, shape (n, 3, 3)."""
+    rotations = [model.plate_pose(q)[1] @ values["mounting"] for q in values["q"]]
+    return np.array(rotations)
 
 
 def _fit_angles(values: Values, forces: Array, model: ArmModel) -> Array:
-    """Return what zeros, base and sensor are off by [rad], shape (12,).
+    """Fit the errors of zeros, base and sensor [rad], shape (12,).
+
+    Gauss-Newton with Gaussian priors on all angles.
 
     Args:
-        values: of C7.
-        forces: of the hung weight in the sensor's frame [N], shape (n, 3).
-        model: of the arm.
+        values: recording of C7.
+        forces: force of the hung weight in the sensor frame [N], shape (n, 3).
+        model: model of the arm.
     """
-    seen = forces / np.linalg.norm(forces, axis=1)[:, None]
+    measured = forces / np.linalg.norm(forces, axis=1)[:, None]
     angles = np.zeros(len(FITTED))
 
-    def left(x: Array) -> Array:
-        told = np.array([_down(values, model, q, x) for q in values["q"]])
+    def residuals(x: Array) -> Array:
+        predicted = np.array([_down(values, model, q, x) for q in values["q"]])
         parts = (
-            ((told - seen) / _DIRECTION).ravel(),
+            ((predicted - measured) / _DIRECTION).ravel(),
             (x[:7] - values["stops"]) / _STOP,
             x / _PRIOR,
         )
@@ -148,15 +150,17 @@ def _fit_angles(values: Values, forces: Array, model: ArmModel) -> Array:
 
     steps = np.eye(len(angles)) * _STEP
     for _ in range(_ROUNDS):
-        here = left(angles)
-        slopes = np.array([(left(angles + step) - here) / _STEP for step in steps]).T
-        angles = angles - np.linalg.lstsq(slopes, here)[0]
+        r = residuals(angles)
+        jacobian = np.array(
+            [(residuals(angles + step) - r) / _STEP for step in steps]
+        ).T
+        angles = angles - np.linalg.lstsq(jacobian, r)[0]
     return angles
 
 
 def _down(values: Values, model: ArmModel, q: Array, x: Array) -> Array:
-    """Return where down is in the sensor's frame if `x` is off, shape (3,)."""
-    # An encoder that tells too much by x has its joint at q - x.
+    """Direction of down in the sensor frame for angle errors `x`, shape (3,)."""
+    # An encoder that reads x too much has its joint at q - x.
     arm = model.plate_pose(q - x[:7])[1]
     base = _turn(np.array([x[7], x[8], 0.0]))
     sensor = arm @ values["mounting"] @ _turn(x[9:12])
@@ -164,7 +168,7 @@ def _down(values: Values, model: ArmModel, q: Array, x: Array) -> Array:
 
 
 def _turn(v: Array) -> Array:
-    """Return the rotation by a small vector of angles [rad], shape (3, 3)."""
+    """Rotation by a vector of angles [rad], shape (3, 3) (Rodrigues)."""
     angle = float(np.linalg.norm(v))
     if angle == 0.0:
         return np.eye(3)
@@ -173,18 +177,18 @@ def _turn(v: Array) -> Array:
 
 
 def angle(a: Array, b: Array) -> float:
-    """Return the angle between two vectors [degrees]."""
+    """Angle between two vectors [degrees]."""
     share = float(a @ b) / float(np.linalg.norm(a) * np.linalg.norm(b) + 1e-12)
     return float(np.degrees(np.arccos(np.clip(share, -1.0, 1.0))))
 
 
 def _lever(loads: Array) -> float:
-    """Return how many times larger than forces moments are, from pose to pose [m]."""
+    """Ratio of moment to force variations between poses [m]."""
     force, moment = loads[:, :3], loads[:, 3:]
     change = _rms(moment - moment.mean(axis=0)), _rms(force - force.mean(axis=0))
     return change[0] / max(change[1], 1e-9)
 
 
 def _rms(left: Array) -> float:
-    """Return the rms of what is left, axis by axis."""
+    """Root mean square of residuals."""
     return float(np.sqrt((left**2).mean()))

@@ -1,4 +1,4 @@
-"""Leads through the steps: collects, judges, writes the record after each."""
+"""Execution of the steps: collect, judge, write the record after each."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,16 +26,16 @@ from experiments.messages import preflight_error
 from experiments.operator.console import BAD, GOOD, WARNING, Console
 from experiments.rig.rig import Rig
 
-SHOWN = 4  # quantities of a step that passed, on the screen
+SHOWN = 4  # quantities of a passed step on the screen
 
 
 @dataclass(slots=True)
 class RecordFolder:
-    """commissioning.json of one arm and the recordings beside it.
+    """Folder of the commissioning of one arm: record and recordings.
 
     Attributes:
-        folder: where they are.
-        record: as it stands.
+        folder: path of the folder.
+        record: present content of commissioning.json.
     """
 
     folder: Path
@@ -43,10 +43,10 @@ class RecordFolder:
 
     @classmethod
     def open(cls, folder: Path, *, is_simulated: bool) -> "RecordFolder":
-        """Return what is there, or an empty record.
+        """Open the record in `folder`, or an empty one.
 
         Raises:
-            SettingsError: what is there is no record, or was changed.
+            SettingsError: the record is invalid or was changed.
         """
         record = read_commissioning(folder)
         if record is None:
@@ -55,27 +55,27 @@ class RecordFolder:
         return cls(folder, record)
 
     def keep(self, done: StepRecord) -> None:
-        """Write the record with a step in its place."""
+        """Insert or replace a step and write the record."""
         self.record = self.record.with_step(done)
         write_commissioning(self.folder, self.record)
 
     def tell(self, name: str, when: datetime) -> None:
-        """Write that a basis of `order.BASES` changed, as a person says."""
+        """Write that a person reported a change of a basis of `order.BASES`."""
         self.record = self.record.with_told(name, when)
         write_commissioning(self.folder, self.record)
 
 
 def do_step(scene: Scene, step: Step, files: RecordFolder, operator: str) -> Judgement:
-    """Do one step and write what came of it.
+    """Run one step and write its record.
 
     Args:
         scene: the rig and the terminal.
-        step: which.
+        step: the step.
         files: the record.
-        operator: who does it.
+        operator: name of the operator.
 
     Raises:
-        PreflightError: the arm is not fit, or a person did not do what was asked.
+        PreflightError: the arm is not fit, or a person did not follow a prompt.
         StopRequestedError: as `ConsoleLoop.tick`.
     """
     scene.say("")
@@ -119,7 +119,7 @@ def do_step(scene: Scene, step: Step, files: RecordFolder, operator: str) -> Jud
 
 
 def _commissioned_with(files: RecordFolder) -> list[int | None]:
-    """Return the serial numbers of the arm when C2 was last sound; [] = it was not."""
+    """Return the serial numbers of the arm when C2 was last sound; [] = never."""
     identity = files.record.of(StepId.IDENTITY)
     if identity is None or not identity.raw:
         return []
@@ -131,17 +131,17 @@ def _commissioned_with(files: RecordFolder) -> list[int | None]:
 def wanted(
     scene: Scene, steps: Sequence[Step], files: RecordFolder, *, is_anew: bool
 ) -> list[Step]:
-    """Return those of `steps` that have to be done; all of them where `is_anew`."""
+    """Return the steps that have to be done; all if `is_anew`."""
     if is_anew:
         return list(steps)
     now, terrain = _now(scene.rig), scene.rig.row.name
-    found = lacks(files.record, scene.inputs(), now, terrain)
-    lacking = {lack.step for lack in found}
+    missing = lacks(files.record, scene.inputs(), now, terrain)
+    lacking = {lack.step for lack in missing}
     return [step for step in steps if step.id in lacking]
 
 
 def say_judgement(console: Console, step: Step, judgement: Judgement) -> None:
-    """Say what came of a step in a line, and what to do where it failed."""
+    """Print the judgement of a step in one line, with the remedy of a failure."""
     console.end_panel()
     name = f"{step.id} {step.id.words}"
     for note in judgement.notes:
@@ -150,23 +150,23 @@ def say_judgement(console: Console, step: Step, judgement: Judgement) -> None:
         console.check(BAD, name, judgement.cause)
         console.say(f"   {step.remedy}")
         return
-    most = sorted(judgement.quantities, key=_nearness, reverse=True)[:SHOWN]
-    text = ", ".join(each.text for each in judgement.quantities if each in most)
+    shown = sorted(judgement.quantities, key=_nearness, reverse=True)[:SHOWN]
+    text = ", ".join(row.text for row in judgement.quantities if row in shown)
     console.check(GOOD, name, text)
 
 
 def _nearness(measured: Measured) -> float:
-    """Return how near a quantity is to its upper limit, 0..1."""
+    """Ratio of a quantity to its upper limit, 0..1; 0 without one."""
     if measured.high is None or measured.high == 0.0:
         return 0.0
     return abs(measured.value / measured.high)
 
 
 def recheck(files: RecordFolder, console: Console) -> bool:
-    """Judge every recording again and write what changed; return whether all pass.
+    """Judge every recording again and write changes; returns whether all pass.
 
     Raises:
-        SettingsError: a recording is missing, or is not what was recorded.
+        SettingsError: a recording is missing or was changed.
     """
     is_sound = True
     for done in files.record.steps:

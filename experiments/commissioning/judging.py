@@ -1,7 +1,7 @@
-"""The judge of a commissioning: quantities against their limits.
+"""Judgement of a step: quantities against their limits.
 
-The limits stand in limits.toml beside this module, by step. Each record keeps those it
-was judged by, so that they can be revised from data.
+The limits are in limits.toml, by step. Each record contains the limits it was judged
+by, so that they can be revised from data.
 """
 
 import tomllib
@@ -14,15 +14,15 @@ from experiments.commissioning.evidence.record import Measured
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """Between which values a quantity passes.
+    """Limits of a quantity.
 
     Attributes:
-        name: of the quantity; may hold `{joint}`.
-        unit: of all values; "" = a number of something.
-        wrong: what is the matter beyond the limits; may hold `{joint}`.
-        source: where the values come from.
-        low: the least that passes; None = no such limit, or the judge computes it.
-        high: the most that passes; None as for `low`.
+        name: name of the quantity; may contain `{joint}`.
+        unit: unit of all values; "" = a count.
+        wrong: diagnosis of a value beyond the limits; may contain `{joint}`.
+        source: source of the limits.
+        low: lower limit; None = no such limit, or computed by the judge.
+        high: upper limit; None as for `low`.
     """
 
     name: str
@@ -35,11 +35,11 @@ class Limit:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A quantity and what is the matter where it does not pass.
+    """A quantity with its limits and its diagnosis.
 
     Attributes:
         measured: the quantity with its limits.
-        wrong: the matter.
+        wrong: diagnosis if it is beyond the limits.
     """
 
     measured: Measured
@@ -48,12 +48,12 @@ class Found:
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What came of a step.
+    """Judgement of a step.
 
     Attributes:
-        quantities: in the order in which they were judged.
-        cause: the first contradiction, in words; "" = none.
-        notes: what is not as expected and keeps nobody from going on, in words.
+        quantities: the quantities in order of judgement.
+        cause: the first contradiction; "" = none.
+        notes: warnings that do not fail the step.
     """
 
     quantities: tuple[Measured, ...]
@@ -62,7 +62,7 @@ class Judgement:
 
 
 def _read_limits() -> dict[str, Limit]:
-    """Return every limit by its name in limits.toml, which is used once."""
+    """Read the limits by their names in limits.toml, which are unique."""
     path = resources.files("experiments.commissioning") / "limits.toml"
     text = path.read_text("utf-8")
     steps: dict[str, dict[str, dict[str, str | float]]] = tomllib.loads(text)
@@ -84,14 +84,14 @@ def found(
     high: float | None = None,
     **fields: object,
 ) -> Found:
-    """Return a quantity beside its limits.
+    """Return a quantity with its limits.
 
     Args:
-        key: of `LIMITS`.
-        value: as measured.
-        low: in place of the least there, where it differs by joint.
-        high: in place of the most there.
-        fields: what its words hold.
+        key: key of `LIMITS`.
+        value: measured value.
+        low: replaces the lower limit, e.g. if it differs by joint.
+        high: replaces the upper limit.
+        fields: fields of its texts.
     """
     limit = LIMITS[key]
     measured = Measured(
@@ -105,7 +105,7 @@ def found(
 
 
 def judged(rows: Sequence[Found], notes: Sequence[str] = ()) -> Judgement:
-    """Return what a step's quantities say together; the first that fails is named."""
+    """Return the judgement of a step; its cause is the first quantity that fails."""
     first = next((row for row in rows if not row.measured.is_within), None)
     cause = "" if first is None else f"{first.measured.text}. {first.wrong}"
     quantities = tuple(row.measured for row in rows)

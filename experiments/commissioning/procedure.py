@@ -19,7 +19,7 @@ from experiments.commissioning.step import Step
 from experiments.commissioning.stop_circuit import STOP_CIRCUIT
 from experiments.commissioning.weights import HUNG_WEIGHT, OWN_WEIGHT
 
-# Steps that share one connection to the rig. A stop takes power and positions away.
+# Steps that share one connection to the rig. The stop button cuts power and positions.
 SITTINGS: tuple[tuple[Step, ...], ...] = (
     (CONFIGURATION, LISTEN, IDENTITY, TIMING),
     (STOP_CIRCUIT,),

@@ -1,4 +1,4 @@
-"""What a step recorded: named arrays in one compressed file, read without pickle."""
+"""Recording of a step: named arrays in one compressed file, without pickle."""
 
 import hashlib
 import io
@@ -33,10 +33,10 @@ def texts(lines: list[str]) -> NDArray[np.str_]:
 
 
 def write_raw(folder: Path, name: str, values: Values) -> Raw:
-    """Write a recording beside commissioning.json and return what names it.
+    """Write a recording to the folder of commissioning.json; returns its entry.
 
     Raises:
-        OSError: it cannot be written.
+        OSError: the file cannot be written.
     """
     buffer = io.BytesIO()
     np.savez_compressed(buffer, allow_pickle=False, **dict(values))
@@ -46,10 +46,10 @@ def write_raw(folder: Path, name: str, values: Values) -> Raw:
 
 
 def read_raw(folder: Path, raw: Raw) -> dict[str, NDArray[Any]]:
-    """Return a recording as it was written.
+    """Read a recording and verify its checksum.
 
     Raises:
-        SettingsError: it is missing, or not what was recorded.
+        SettingsError: the file is missing or was changed.
     """
     path = folder / raw.file
     try:

@@ -1,4 +1,4 @@
-"""C8 to C11: little torque for an arm that lies on its stops."""
+"""C8 to C11: powered tests with little torque, the arm lying on its stops."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -25,28 +25,29 @@ from experiments.messages import preflight_error
 from experiments.run.stop import ArmFaultError
 from wam.model.constants import ArmConstants, Array
 
-# Joints as they are pushed, the sign is that of the motion: what bears least first.
+# Joints in test order, signed by the direction of motion: least loaded first.
 PUSHED = (1, -1, 3, -3, 5, -5, 7, -7, 2, -4, -6)
-LIFTED = (2, -4, -6)  # those that bear weight on the rest pose
+LIFTED = (2, -4, -6)  # joints that carry weight in the rest pose
 _RAMP_SECONDS = 1.0
-_AFTER = 0.3  # s, recorded beyond the end of a ramp
-_REST = 0.6  # s, without torque at the end of a proof
-_STILL = 1.0  # s, C8
+_AFTER = 0.3  # s, recorded after the end of a ramp
+_REST = 0.6  # s, without torque at the end of a test
+_STILL = 1.0  # s, duration of C8
 _LIFT_SECONDS = (
     2 * POWERED_TEST_LIMITS.lift_travel / POWERED_TEST_LIMITS.lift_speed + 0.6
 )
 _GRAVITY_SECONDS, _GRAVITY_KEPT = 1.4, 0.6
-_ON_POSE = 0.12  # rad
-_PATIENCE = 120.0  # s
-_MIDDLE = (0.3, 0.8)  # share of the way of a lift in which its torque is averaged
-# What weights may be off: N m, of joints with masses of the drawings, and a share.
-_WEIGHED_OFF: Mapping[int, float] = {2: 2.0, -4: 0.7, -6: 0.25}
-_SHARE_OFF = 0.2
-_CARRIED = 8.0  # s, a simulated hand takes to lay the arm down
+_ON_POSE = 0.12  # rad, tolerance of the rest pose
+_PATIENCE = 120.0  # s, time-out of the activation
+_MIDDLE = (0.3, 0.8)  # section of a lift's travel in which torque is averaged
+# Tolerance of the measured weights: N m by joint, for masses of the drawings, and a
+# relative one.
+_WEIGHT_TOLERANCE: Mapping[int, float] = {2: 2.0, -4: 0.7, -6: 0.25}
+_RELATIVE_TOLERANCE = 0.2
+_CARRIED = 8.0  # s, time of a simulated hand to lay the arm down
 
 
 def rest_pose(constants: ArmConstants) -> Array:
-    """Return the pose in which all joints that bear weight lie on stops [rad], (7,)."""
+    """Pose in which all joints that carry weight lie on stops [rad], shape (7,)."""
     q = constants.home.copy()
     q[5] = constants.q_upper[5]
     return q
@@ -56,7 +57,7 @@ def lay_down(scene: Scene) -> None:
     """Have the arm laid into its rest pose, then activated without torque.
 
     Raises:
-        PreflightError: it does not lie there, or was not activated in time.
+        PreflightError: the arm is not in the pose, or was not activated in time.
         ArmFaultError, StopRequestedError: as `ConsoleLoop.tick`.
     """
     if scene.is_testing:
@@ -71,24 +72,24 @@ def lay_down(scene: Scene) -> None:
         scene.await_hand()
         scene.simulation.let_go()
         scene.wait(1.0)
-    here = scene.loop_client.latest()["position"][0]
-    joint = int(np.abs(here - q).argmax())
-    if abs(here[joint] - q[joint]) > _ON_POSE:
+    position = scene.loop_client.latest()["position"][0]
+    joint = int(np.abs(position - q).argmax())
+    if abs(position[joint] - q[joint]) > _ON_POSE:
         raise PreflightError(
-            f"Joint {joint + 1} is at {here[joint]:.2f} rad, in the rest pose it is at "
-            f"{q[joint]:.2f}.",
+            f"Joint {joint + 1} is at {position[joint]:.2f} rad, in the rest pose it "
+            f"is at {q[joint]:.2f}.",
             hint="Lay the arm onto its stops and begin the step again.",
             arm_state="idle; it sinks slowly, support it",
         )
     _activate(scene, "Press Shift-activate.", "activate")
 
 
-def _activate(scene: Scene, said: str, *presses: PendantAction) -> None:
-    """Have an arm that lies activated without torque; raises as `lay_down`."""
+def _activate(scene: Scene, text: str, *presses: PendantAction) -> None:
+    """Have the lying arm activated without torque; raises as `lay_down`."""
     scene.loop_client.start()
     scene.prove(PoweredTestGoal(PoweredTestKind.REST))
     scene.wait(0.1)
-    scene.say(f"{said} Keep the hands off the arm: it gets no torque.")
+    scene.say(f"{text} Keep the hands off the arm: it gets no torque.")
     if scene.simulation is not None:
         for press in presses:
             scene.simulation.pendant(press)
@@ -102,7 +103,7 @@ def _activate(scene: Scene, said: str, *presses: PendantAction) -> None:
 
 
 def rest(scene: Scene) -> Values:
-    """Activate the arm and give it nothing."""
+    """Activate the arm without torque and record it."""
     reader = scene.rig.shared.cycles.reader()
     ended = scene.until_fault(lambda: lay_down(scene), _STILL)
     record = reader.read()
@@ -116,9 +117,9 @@ def rest(scene: Scene) -> Values:
 
 
 def rest_and_silence(scene: Scene) -> Values:
-    """Do `rest`, then ask for no position until the module brakes: its heartbeat.
+    """Run `rest`, then stop all requests until the module's heartbeat brakes.
 
-    A module that braked takes a press of the pendant to be active again.
+    After braking the module must be activated again at the pendant.
     """
     values = rest(scene)
     if words(values, "ended"):
@@ -132,13 +133,13 @@ def rest_and_silence(scene: Scene) -> Values:
     try:
         scene.wait(POWERED_TEST_LIMITS.silence + _AFTER)
     except ArmFaultError as fault:
-        said = scene.fault_words(fault)
+        text = scene.fault_words(fault)
         if not is_heartbeat(fault.verdict):
-            ended = [said]
+            ended = [text]
     record = reader.read()
     if not (ended or scene.is_testing):
-        said = "The module braked. Press Shift-idle, then Shift-activate."
-        _activate(scene, said, "idle", "activate")
+        text = "The module braked. Press Shift-idle, then Shift-activate."
+        _activate(scene, text, "idle", "activate")
     return {
         **values,
         "ended": texts(ended),
@@ -149,26 +150,26 @@ def rest_and_silence(scene: Scene) -> Values:
 
 
 def is_heartbeat(verdict: GuardVerdict) -> bool:
-    """Return whether the module went idle for its heartbeat, and for no press."""
+    """Return whether the module went idle by its heartbeat, not by a press."""
     causes = verdict.detail.causes if isinstance(verdict.detail, CircuitCauses) else ()
     return verdict.fault is Fault.PENDANT_IDLE and "heartbeat" in causes
 
 
 def judge_rest(values: Values) -> Judgement:
-    """Judge an arm without torque from its first active cycle, and its module."""
+    """Judge an active arm without torque, and its module's heartbeat."""
     rows = rest_rows(values)
-    if "silent_ns" in values:  # not after a fault, nor of the daily check
+    if "silent_ns" in values:  # absent after a fault and in the daily check
         rows.append(found("silence", _braked_after(values)))
     return judged(rows)
 
 
 def _braked_after(values: Values) -> float:
-    """Return the time from the last position to a module that braked [ms].
+    """Time from the last position to the braking of the module [ms].
 
-    One that did not is given the whole of the silence.
+    The whole silence if the module did not brake.
     """
     t_ns, mode = values["silent_ns"], values["silent_mode"]
-    is_braked = np.isin(mode, [int(each) for each in SHORTED])
+    is_braked = np.isin(mode, [int(shorted) for shorted in SHORTED])
     if not is_braked.any():
         return 1e3 * POWERED_TEST_LIMITS.silence
     first = int(is_braked.argmax())
@@ -178,17 +179,17 @@ def _braked_after(values: Values) -> float:
 
 
 def rest_rows(values: Values) -> list[Found]:
-    """Return the quantities of an arm without torque."""
+    """Quantities of an active arm without torque."""
     seconds = _seconds(values["t_ns"])
     rows = [
-        found("rest", 1e3 * way, high=1e3 * POWERED_TEST_LIMITS.rest[i], joint=i + 1)
-        for i, way in enumerate(_ways(values["q"]))
+        found("rest", 1e3 * travel, high=1e3 * POWERED_TEST_LIMITS.rest[i], joint=i + 1)
+        for i, travel in enumerate(_travels(values["q"]))
     ]
-    return [*rows, *_ended(values), found("active", seconds)]
+    return [*rows, *_ended_row(values), found("active", seconds)]
 
 
 def ramps(scene: Scene, joints: Sequence[int] = PUSHED) -> Values:
-    """Push one joint after the other, each until it moves; the sign is the sense."""
+    """Ramp the torque of one joint after another, each until it moves."""
     lay_down(scene)
     constants, q = scene.rig.model.constants, scene.position()
     weights = scene.rig.law_model.gravity(q)
@@ -203,20 +204,20 @@ def ramps(scene: Scene, joints: Sequence[int] = PUSHED) -> Values:
         goals.append(
             PoweredTestGoal(PoweredTestKind.RAMP, i + 1, sense * torque, _RAMP_SECONDS)
         )
-    values = _proofs(scene, goals, _RAMP_SECONDS + _AFTER)
+    values = _run_tests(scene, goals, _RAMP_SECONDS + _AFTER)
     return {**values, "weights": weights}
 
 
 def judge_ramps(values: Values) -> Judgement:
-    """Judge whether each joint moved as it was pushed, and at which torque."""
+    """Judge direction and lift-off torque of each joint."""
     return judged(ramp_rows(values))
 
 
 def liftoffs(values: Values) -> dict[int, float]:
-    """Return what lifted each joint off its stop [N m], by joint with its sense.
+    """Lift-off torque of each joint [N m], by joint signed with its direction.
 
     Args:
-        values: of `ramps`; joints that it did not come to are left out.
+        values: recording of `ramps`; joints not reached are left out.
     """
     torques: dict[int, float] = {}
     for k, (joint, torque) in enumerate(
@@ -229,7 +230,7 @@ def liftoffs(values: Values) -> dict[int, float]:
 
 
 def ramp_rows(values: Values) -> list[Found]:
-    """Return the quantities of joints that were pushed."""
+    """Quantities of the ramped joints."""
     lifted = liftoffs(values)
     rows: list[Found] = []
     for number, (joint, torque) in enumerate(
@@ -240,54 +241,56 @@ def ramp_rows(values: Values) -> list[Found]:
             break
         i, sense = int(joint) - 1, 1.0 if torque > 0 else -1.0
         q = values["q"][part]
-        ways = np.abs(q - q[0]).max(axis=0)
-        ways[i] = 0.0
-        most = np.array(
+        travels = np.abs(q - q[0]).max(axis=0)
+        travels[i] = 0.0
+        limits = np.array(
             [POWERED_TEST_LIMITS.other_joint_travel(i + 1, j) for j in range(1, 8)]
         )
-        other = int((ways / most).argmax())
+        other = int((travels / limits).argmax())
         rows.append(
             found(
                 "aside",
-                1e3 * ways[other],
-                high=1e3 * most[other],
+                1e3 * travels[other],
+                high=1e3 * limits[other],
                 joint=i + 1,
                 other=other + 1,
                 pushed=_signed(i, sense),
             )
         )
-        way = sense * (q[:, i] - q[0, i])
+        travel = sense * (q[:, i] - q[0, i])
         reach = POWERED_TEST_LIMITS.reach[i]
         rows.append(
-            found("moved", 1e3 * way.max(), low=1e3 * reach, joint=_signed(i, sense))
+            found("moved", 1e3 * travel.max(), low=1e3 * reach, joint=_signed(i, sense))
         )
         if (needed := lifted.get(int(sense) * (i + 1))) is not None:
             weight = abs(float(values["weights"][i]))
             rows.append(found("liftoff", needed / weight, joint=i + 1))
-    return [*rows, *_ended(values)]
+    return [*rows, *_ended_row(values)]
 
 
 def lift(scene: Scene) -> Values:
-    """Lift the joints that bear weight off their stops and lay them back."""
+    """Lift the joints that carry weight off their stops and lay them back."""
     lay_down(scene)
     constants, q = scene.rig.model.constants, scene.position()
     weights = scene.rig.law_model.gravity(q)
     goals: list[PoweredTestGoal] = []
     for signed in LIFTED:
         i = abs(signed) - 1
-        most = 1.5 * (abs(float(weights[i])) + float(constants.coulomb[i]))
-        most = min(most, 0.9 * scene.rig.settings.rig.limits.torque[i])
+        limit = 1.5 * (abs(float(weights[i])) + float(constants.coulomb[i]))
+        limit = min(limit, 0.9 * scene.rig.settings.rig.limits.torque[i])
         goals.append(
-            PoweredTestGoal(PoweredTestKind.LIFT, i + 1, most if signed > 0 else -most)
+            PoweredTestGoal(
+                PoweredTestKind.LIFT, i + 1, limit if signed > 0 else -limit
+            )
         )
-    values = _proofs(scene, goals, _LIFT_SECONDS)
+    values = _run_tests(scene, goals, _LIFT_SECONDS)
     model = scene.rig.law_model
     predicted = np.array([model.gravity(row) for row in values["q"]]).reshape(-1, 7)
     return {**values, "predicted": predicted}
 
 
 def judge_lift(values: Values) -> Judgement:
-    """Judge what the joints weigh: the middle of up and down, friction cancels."""
+    """Judge the joints' weights: means of up and down, so that friction cancels."""
     rows: list[Found] = []
     for number, (joint, torque) in enumerate(
         zip(values["joints"].tolist(), values["torques"].tolist(), strict=True)
@@ -297,44 +300,49 @@ def judge_lift(values: Values) -> Judgement:
             break
         i, sense = int(joint) - 1, 1.0 if torque > 0 else -1.0
         q, tau = values["q"][part][:, i], sense * values["tau"][part][:, i]
-        way = sense * (q - q[0])
-        rows.append(found("lifted", 1e3 * way.max(), joint=i + 1))
+        travel = sense * (q - q[0])
+        rows.append(found("lifted", 1e3 * travel.max(), joint=i + 1))
         low, high = (share * POWERED_TEST_LIMITS.lift_travel for share in _MIDDLE)
-        inside = (way > low) & (way < high)
-        before = np.arange(len(way)) < int(way.argmax())
+        inside = (travel > low) & (travel < high)
+        before = np.arange(len(travel)) < int(travel.argmax())
         up, down = tau[inside & before], tau[inside & ~before]
         if len(up) and len(down):
             weight = (up.mean() + down.mean()) / 2
             predicted = sense * values["predicted"][part][inside, i].mean()
-            most = min(_WEIGHED_OFF[int(sense) * (i + 1)] / abs(predicted), _SHARE_OFF)
-            low, high = 1.0 - most, 1.0 + most
+            tolerance = min(
+                _WEIGHT_TOLERANCE[int(sense) * (i + 1)] / abs(predicted),
+                _RELATIVE_TOLERANCE,
+            )
+            low, high = 1.0 - tolerance, 1.0 + tolerance
             ratio = weight / predicted
             rows.append(found("weight", ratio, low=low, high=high, joint=i + 1))
-    return judged([*rows, *_ended(values)])
+    return judged([*rows, *_ended_row(values)])
 
 
 def gravity_ramp(scene: Scene) -> Values:
-    """Let the compensation of gravity grow to the whole."""
+    """Ramp the gravity compensation to full strength."""
     lay_down(scene)
     goal = PoweredTestGoal(PoweredTestKind.GRAVITY, seconds=_GRAVITY_SECONDS)
-    return _proofs(scene, [goal], _GRAVITY_SECONDS + _GRAVITY_KEPT)
+    return _run_tests(scene, [goal], _GRAVITY_SECONDS + _GRAVITY_KEPT)
 
 
 def judge_gravity_ramp(values: Values) -> Judgement:
-    """Judge whether the compensation moves an arm that lies."""
-    most = [1e3 * POWERED_TEST_LIMITS.gravity * way for way in POWERED_TEST_LIMITS.rest]
+    """Judge whether the compensation moves the lying arm."""
+    limits = [1e3 * POWERED_TEST_LIMITS.gravity * m for m in POWERED_TEST_LIMITS.rest]
     rows = [
-        found("gravity", 1e3 * way, high=most[i], joint=i + 1)
-        for i, way in enumerate(_ways(values["q"]))
+        found("gravity", 1e3 * travel, high=limits[i], joint=i + 1)
+        for i, travel in enumerate(_travels(values["q"]))
     ]
     share = _seconds(values["t_ns"]) / _GRAVITY_SECONDS
     return judged(
-        [*rows, *_ended(values), found("share", share, text="It ended early")]
+        [*rows, *_ended_row(values), found("share", share, text="It ended early")]
     )
 
 
-def _proofs(scene: Scene, goals: Sequence[PoweredTestGoal], seconds: float) -> Values:
-    """Do one proof after the other until one ends in idle; return what was seen."""
+def _run_tests(
+    scene: Scene, goals: Sequence[PoweredTestGoal], seconds: float
+) -> Values:
+    """Run one powered test after another until one ends in idle; returns the record."""
     parts: list[NDArray[Any]] = []
     numbers: list[NDArray[Any]] = []
     ended: list[str] = []
@@ -342,7 +350,7 @@ def _proofs(scene: Scene, goals: Sequence[PoweredTestGoal], seconds: float) -> V
         scene.show_share(number / len(goals), _words(goal))
         scene.prove(goal)
         reader = scene.rig.shared.cycles.reader()
-        # It ends without torque, and lies down again within its own limits.
+        # A test ends without torque, the arm lying down within its own limits.
         ended = scene.until_fault(lambda: None, seconds + _REST)
         part = reader.read()
         parts.append(part)
@@ -371,8 +379,8 @@ def _signed(i: int, sense: float) -> str:
     return f"{i + 1}{'+' if sense > 0 else '-'}"
 
 
-def _ways(q: NDArray[Any]) -> Array:
-    """Return how far each joint went from where it was first [rad], shape (7,)."""
+def _travels(q: NDArray[Any]) -> Array:
+    """Largest travel of each joint from its initial position [rad], shape (7,)."""
     return np.abs(q - q[0]).max(axis=0) if len(q) else np.zeros(7)
 
 
@@ -380,7 +388,7 @@ def _seconds(t_ns: NDArray[Any]) -> float:
     return float(t_ns[-1] - t_ns[0]) * 1e-9 if len(t_ns) else 0.0
 
 
-def _ended(values: Values) -> list[Found]:
+def _ended_row(values: Values) -> list[Found]:
     ended = words(values, "ended")
     return [found("ended", len(ended), text=" ".join(ended))]
 

@@ -1,7 +1,7 @@
-"""C14: the sensor in its place against a kitchen scale and a spring balance, arm idle.
+"""C14: the mounted sensor against a kitchen scale and a spring balance, arm idle.
 
-Both are read by a person, who types what they show. In the base frame the foot's weight
-is the same before and while it presses, so differences are of the scale alone.
+A person reads both and types the values. In the base frame the foot's weight is the
+same before and during pressing, so differences are due to the scale alone.
 """
 
 import numpy as np
@@ -16,15 +16,15 @@ from experiments.commissioning.weights import POSES, bring, measure
 from wam.model.arm_model import ArmModel
 from wam.model.constants import GRAVITY, Array, load_constants
 
-PRESSED = 4.0  # kg, about; a simulated scale shows exactly this
+PRESSED = 4.0  # kg, approximate; a simulated scale shows exactly this
 PULLED = 10.0  # N
-_SHARE, _LEAST = 0.03, 0.4  # of what is shown, and N, that they may differ by
-_LONG = 5.0  # s, that simulated hands press
+_SHARE, _LEAST = 0.03, 0.4  # tolerance: share of the reading, plus N
+_PRESS_SECONDS = 5.0  # s, duration of a press by simulated hands
 _SETTLED = 1.0  # s
 
 
 def collect(scene: Scene) -> Values:
-    """Have the foot pressed onto a scale and pulled; return readings and what is typed.
+    """Have the foot pressed onto a scale and pulled; returns readings and typed values.
 
     Raises:
         PreflightError: too few readings.
@@ -39,7 +39,9 @@ def collect(scene: Scene) -> Values:
     _simulate(scene, (0.0, 0.0, PRESSED * GRAVITY))
     parts.append(measure(scene))
     pressed = scene.ask_number("What did the scale show [kg]?", PRESSED)
-    parts.append(_free(scene, "Lift the foot off the scale, nothing touches it."))
+    parts.append(
+        _measure_free(scene, "Lift the foot off the scale, nothing touches it.")
+    )
     scene.ask(
         f"Pull level at the middle of the sole with the spring balance, about "
         f"{PULLED:g} N. Read it. [space] while it pulls."
@@ -47,7 +49,9 @@ def collect(scene: Scene) -> Values:
     _simulate(scene, (0.0, PULLED, 0.0))
     parts.append(measure(scene))
     pulled = scene.ask_number("What did the balance show [N]?", PULLED)
-    parts.append(_free(scene, "Take the balance off, nothing touches the foot."))
+    parts.append(
+        _measure_free(scene, "Take the balance off, nothing touches the foot.")
+    )
     payload = scene.rig.payload
     return {
         "q": np.array([q for q, _ in parts]),
@@ -59,21 +63,21 @@ def collect(scene: Scene) -> Values:
     }
 
 
-def _free(scene: Scene, text: str) -> tuple[Array, Array]:
+def _measure_free(scene: Scene, text: str) -> tuple[Array, Array]:
     scene.ask(f"{text} [space] when it is still.")
     if scene.simulation is not None:
-        scene.wait(_LONG)  # until the simulated hands have let go
+        scene.wait(_PRESS_SECONDS)  # until the simulated hands let go
     return measure(scene)
 
 
 def _simulate(scene: Scene, force: tuple[float, float, float]) -> None:
     if scene.simulation is not None:
-        scene.simulation.push_with(force, _LONG)
+        scene.simulation.push_with(force, _PRESS_SECONDS)
         scene.wait(_SETTLED)
 
 
 def judge(values: Values) -> Judgement:
-    """Judge what the sensor shows of two forces that others measured."""
+    """Judge two forces of the sensor against scale and balance."""
     R = orientations(values, ArmModel(load_constants()))
     loads = number(values, "sign") * values["readings"][:, :3]
     forces = np.array([turn @ load for turn, load in zip(R, loads, strict=True)])
@@ -84,16 +88,16 @@ def judge(values: Values) -> Judgement:
     return judged(
         [
             found("pressed", pressed),
-            _beside("scale", up - pressed, pressed),
+            _difference_row("scale", up - pressed, pressed),
             found("pulled", pulled),
-            _beside("balance", level - pulled, pulled),
+            _difference_row("balance", level - pulled, pulled),
         ]
     )
 
 
-def _beside(key: str, apart: float, shown: float) -> Found:
-    most = _SHARE * abs(shown) + _LEAST
-    return found(key, apart, low=-most, high=most)
+def _difference_row(key: str, difference: float, shown: float) -> Found:
+    tolerance = _SHARE * abs(shown) + _LEAST
+    return found(key, difference, low=-tolerance, high=tolerance)
 
 
 PLATE = Step(

@@ -1,4 +1,4 @@
-"""What a step works with: the rig, the terminal, the hands of a simulation."""
+"""Scene of a step: the rig, the terminal, the hands of a simulation."""
 
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -26,24 +26,24 @@ from wam.model.constants import Array
 
 _BAR = 24  # characters
 COMMAND = "traction commission"
-_LARGEST_NUMBER = 1000.0  # that a scale shows
+_LARGEST_NUMBER = 1000.0  # reading of a scale
 _NO_TRIAL = TrialName(0, 0)
 
 
 @dataclass(slots=True)
 class Scene:
-    """One sitting of steps on one rig.
+    """Steps that share one connection to a rig.
 
     Attributes:
-        rig: its bus is open.
+        rig: the rig, its bus open.
         console_loop: rig, terminal and operator together.
-        info: of the arm that was started; None = it was not.
-        answers: what its pucks said of themselves.
-        sensor: what the wrist sensor said of itself; None = it was not opened.
-        serials: of its pucks when C2 was last sound; () = it was not.
-        is_testing: the arm is active in a proof.
-        stops: by how much each joint's zero is off by its stops [rad], shape (7,);
-            None = not measured.
+        info: result of the arm's start; None = not started.
+        answers: properties of its pucks.
+        sensor: identity of the wrist sensor; None = not opened.
+        serials: serial numbers of its pucks when C2 was last sound; () = never.
+        is_testing: whether the arm is active in a powered test.
+        stops: zero errors of the joints from their stops [rad], shape (7,); None = not
+            measured.
     """
 
     rig: Rig
@@ -62,16 +62,16 @@ class Scene:
 
     @property
     def simulation(self) -> SimulationControl | None:
-        """Hand and pendant of a simulated rig, None where persons have them."""
+        """Hand and pendant of a simulated rig, None for a real one."""
         return self.rig.simulation
 
     @property
     def console(self) -> Console:
-        """Where everything is printed."""
+        """The console of the session."""
         return self.console_loop.console
 
     def start(self) -> None:
-        """Start arm, sensor and loop, unless that was done.
+        """Start arm, sensor and loop, unless they run already.
 
         Raises:
             TractionError: the arm or the sensor is not fit.
@@ -84,22 +84,22 @@ class Scene:
         self.rig.backend.begin()
 
     def inputs(self) -> dict[str, str]:
-        """Return digests of what steps stand on, as far as it is known now."""
+        """Return the digests of the inputs of steps known now."""
         return present_inputs(self.rig, self.answers, self.info, self.sensor)
 
     def say(self, text: str) -> None:
-        """Print a line, below which the bar goes on."""
+        """Print a line above the progress bar."""
         self.console.end_panel()
         self.console.say(text)
 
     def show_share(self, share: float, what: str) -> None:
-        """Show how much of a step is done, where there is a terminal."""
+        """Show the progress of a step, on a terminal."""
         full = round(_BAR * min(share, 1.0))
         bar = "█" * full + "░" * (_BAR - full)
         self.console.panel([f" {bar} {share:4.0%}  {what}"])
 
     def show(self, work: Iterator[tuple[float, Values]], what: str) -> Values:
-        """Do `work`, of which the share done is shown; return what came last."""
+        """Run `work` with a progress bar; returns its last values."""
         values: Values = {}
         for share, values in work:  # noqa: B007
             self.show_share(share, what)
@@ -108,7 +108,7 @@ class Scene:
         return values
 
     def ask(self, text: str) -> None:
-        """Say `text` and wait for [space].
+        """Print `text` and wait for [space].
 
         Raises:
             PreflightError: the arm lost its power.
@@ -119,11 +119,11 @@ class Scene:
             pass
 
     def ask_number(self, text: str, simulated: float) -> float:
-        """Return the positive number that a person types after `text`.
+        """Ask for a positive number.
 
         Args:
-            text: what is asked.
-            simulated: what simulated hands read.
+            text: the question.
+            simulated: answer of a simulated operator.
 
         Raises:
             ArmFaultError, StopRequestedError: as `ConsoleLoop.tick`.
@@ -149,15 +149,15 @@ class Scene:
         return line
 
     def wait(self, seconds: float) -> None:
-        """Let `seconds` pass; raises as `ask`."""
+        """Run the console loop for `seconds`; raises as `ask`."""
         for _ in range(max(1, round(seconds / TICK))):
             self._tick(Prompt.MOVING)
 
     def _tick(self, prompt: Prompt) -> str:
-        """Let 20 ms pass and return the key pressed; raises as `ask`.
+        """Advance by 20 ms; returns the key pressed; raises as `ask`.
 
-        The guard reports nothing for an idle arm in E-stop, and its pucks send no
-        positions: whatever a step recorded from then on would mean nothing.
+        The guard reports no fault of an idle arm in E-stop, whose pucks send no
+        positions: the recording of a step would be meaningless.
         """
         key = self.console_loop.tick(prompt)
         if self.loop_client.status.safety is SafetyMode.E_STOP:
@@ -165,18 +165,18 @@ class Scene:
         return key
 
     def await_hand(self) -> None:
-        """Wait until a simulated hand has done what it was told; raises as `ask`."""
+        """Wait until a simulated hand has completed its order; raises as `ask`."""
         hand = self.simulation
         while hand is not None and not hand.is_hand_done:
             self.wait(TICK)
 
     def wait_through(self, seconds: float) -> None:
-        """Let `seconds` pass whatever the guard says; raises StopRequestedError."""
+        """Run for `seconds` regardless of faults; raises StopRequestedError."""
         for _ in range(max(1, round(seconds / TICK))):
             self._tick_through()
 
     def ask_through(self, text: str) -> None:
-        """Say `text` and wait for [space] whatever the guard says."""
+        """Print `text` and wait for [space] regardless of faults."""
         self.say(text)
         while self._tick_through() != " ":
             pass
@@ -185,13 +185,13 @@ class Scene:
         try:
             return self.console_loop.tick(Prompt.PAUSED)
         except ArmFaultError:
-            return ""  # it is told once; what comes of it is recorded
+            return ""  # raised once; its effect is recorded
 
     def until_fault(self, work: Callable[[], None], seconds: float) -> list[str]:
-        """Do `work`, wait; return what the guard stopped it for, [] for nothing.
+        """Run `work` and wait; returns the fault that stopped it, [] for none.
 
         Raises:
-            ArmFaultError: a person stopped the arm, which says nothing about it.
+            ArmFaultError: a person stopped the arm.
             PreflightError, StopRequestedError: as `ask`.
         """
         try:
@@ -204,7 +204,7 @@ class Scene:
         return []
 
     def fault_words(self, fault: ArmFaultError) -> str:
-        """Return the message of what the guard stopped the arm for."""
+        """Message of the fault for which the guard stopped the arm."""
         self.is_testing = False
         self.loop_client.advance(TICK)
         context = FaultContext(
@@ -218,7 +218,7 @@ class Scene:
 
     @contextmanager
     def followed(self) -> Generator[None]:
-        """Let a simulated hand follow the prompts meanwhile, as in a session."""
+        """Context in which a simulated hand follows the prompts, as in a session."""
         if self.simulation is not None:
             self.console_loop.hand = SimulatedHand(self.simulation)
         try:
@@ -227,11 +227,11 @@ class Scene:
             self.console_loop.hand = None
 
     def prove(self, goal: PoweredTestGoal) -> None:
-        """Ask the loop for a proof."""
+        """Request a powered test from the loop."""
         self.loop_client.prove(goal)
 
     def position(self) -> Array:
-        """Return where the joints are [rad], shape (7,)."""
+        """Joint positions [rad], shape (7,)."""
         return self.loop_client.latest()["position"][0].copy()
 
 

@@ -1,4 +1,4 @@
-"""What a step of the commissioning is: something collected, and its judge."""
+"""A step of the commissioning: its recording and its judge."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,14 +14,14 @@ class Step:
     """One step.
 
     Attributes:
-        id: its number.
-        collect: asks for what it needs, lets the arm do it, returns what was recorded.
-        judge: returns what came of a recording; it looks at nothing else.
-        minutes: it takes about so long.
-        remedy: what to do where it fails.
-        needs_loop: the loop runs; the arm need not be zeroed.
-        needs_zero: the arm is zeroed.
-        needs_torque: the arm is driven in the open: steps C0 to C11 have to count.
+        id: number of the step.
+        collect: runs the step with operator and arm; returns the recording.
+        judge: judges a recording; a pure function of it.
+        minutes: approximate duration.
+        remedy: advice after a failure.
+        needs_loop: whether the loop must run; the arm need not be zeroed.
+        needs_zero: whether the arm must be zeroed.
+        needs_torque: whether the arm is driven freely: C0 to C11 must be valid.
     """
 
     id: StepId

@@ -16,19 +16,19 @@ from experiments.commissioning.recording import Values
 from experiments.commissioning.scene import Scene
 from experiments.commissioning.step import Step
 
-_PATIENCE = 60.0  # s, for each press
-_RELEASED = 2.0  # s, that a released stop has to last
-_AFTER = 0.5  # s, that are recorded after the last press
-_SILENT_CYCLES = 20  # in which no puck answers: it has no power
-_TOLD_NS = 100_000_000  # ns, within which this side knows what a cycle found
+_PATIENCE = 60.0  # s, time-out of each press
+_RELEASED = 2.0  # s, time that E-stop must last after the release
+_AFTER = 0.5  # s, recorded after the last press
+_SILENT_CYCLES = 20  # cycles without any reply: no power
+_REPORT_NS = 100_000_000  # latency of the loop's status
 _MS = PERIOD_NS / 1e6
 
 
 def collect(scene: Scene) -> Values:
-    """Have the pendant pressed four times and record what came of it.
+    """Have the pendant pressed four times; returns the recording.
 
     Raises:
-        PreflightError: a press was not seen.
+        PreflightError: a press was not detected.
         StopRequestedError: as `ConsoleLoop.tick`.
     """
     simulation = scene.simulation
@@ -38,13 +38,13 @@ def collect(scene: Scene) -> Values:
     scene.say("1/4 Press Shift-activate, though nobody has asked for it.")
     if simulation is not None:
         simulation.pendant("activate")
-    seen.append(_see(scene, SafetyMode.ACTIVE, "Shift-activate"))
+    seen.append(_await_mode(scene, SafetyMode.ACTIVE, "Shift-activate"))
     early_ns = scene.rig.clock.now_ns()
     scene.wait_through(1.0)
     scene.say("2/4 Press the stop button.")
     if simulation is not None:
         simulation.pendant("estop")
-    seen.append(_see(scene, SafetyMode.E_STOP, "the stop button"))
+    seen.append(_await_mode(scene, SafetyMode.E_STOP, "the stop button"))
     scene.ask_through("3/4 Release the stop button, press nothing else, then [space].")
     released_ns = scene.rig.clock.now_ns()
     scene.wait_through(_RELEASED)
@@ -52,7 +52,7 @@ def collect(scene: Scene) -> Values:
     scene.say("4/4 Press Shift-idle.")
     if simulation is not None:
         simulation.pendant("idle")
-    seen.append(_see(scene, SafetyMode.IDLE, "Shift-idle"))
+    seen.append(_await_mode(scene, SafetyMode.IDLE, "Shift-idle"))
     scene.wait_through(_AFTER)
     record = reader.read()
     return {
@@ -66,11 +66,11 @@ def collect(scene: Scene) -> Values:
     }
 
 
-def _see(scene: Scene, mode: SafetyMode, button: str) -> bool:
+def _await_mode(scene: Scene, mode: SafetyMode, button: str) -> bool:
     """Wait until the module has been in `mode`.
 
     Raises:
-        PreflightError: it was not within a minute.
+        PreflightError: time-out after a minute.
     """
     reader = scene.rig.shared.cycles.reader()
 
@@ -101,7 +101,7 @@ def _await(scene: Scene, is_done: Callable[[], bool]) -> bool:
 
 
 def judge(values: Values) -> Judgement:
-    """Judge what `collect` recorded."""
+    """Judge a recording of `collect`."""
     t_ns, mode, fresh = values["t_ns"], values["mode"], values["fresh"]
     stop = mode == SafetyMode.E_STOP
     first = int(stop.argmax()) if stop.any() else len(stop)
@@ -126,17 +126,17 @@ def judge(values: Values) -> Judgement:
 
 
 def _longest(t_ns: NDArray[np.int64], is_so: NDArray[np.bool_]) -> int:
-    """Return the longest time from a cycle that is so to the next that is not [ns].
+    """Longest time from a cycle in which `is_so` holds to the next without it [ns].
 
-    While the module is being put to idle there are no cycles: what it takes lies
-    between two of them.
+    There are no cycles while the module is set to idle: that time lies between two of
+    them.
     """
     times = t_ns.tolist()
     longest, since = 0, None
-    for i, each in enumerate(is_so.tolist()):
-        if each and since is None:
+    for i, holds in enumerate(is_so.tolist()):
+        if holds and since is None:
             since = i
-        elif since is not None and not each:
+        elif since is not None and not holds:
             longest, since = max(longest, times[i] - times[since]), None
     if since is not None:
         longest = max(longest, times[len(is_so) - 1] - times[since])
@@ -144,18 +144,18 @@ def _longest(t_ns: NDArray[np.int64], is_so: NDArray[np.bool_]) -> int:
 
 
 def _longest_pause(t_ns: NDArray[np.int64], early_ns: int) -> int:
-    """Return the longest time between two cycles about `early_ns` [ns].
+    """Longest time between two cycles about `early_ns` [ns].
 
-    The cycle that meets an active module puts it to idle and tells its mode after that:
-    where it obeys, or its heartbeat brakes it meanwhile, no cycle tells that it was
-    active.
+    The cycle that finds the module active sets it to idle and reports its mode
+    afterwards: if the module obeys, or its heartbeat brakes meanwhile, no cycle reports
+    that it was active.
     """
-    is_near = (t_ns[1:] > early_ns - _TOLD_NS) & (t_ns[:-1] < early_ns)
+    is_near = (t_ns[1:] > early_ns - _REPORT_NS) & (t_ns[:-1] < early_ns)
     return int(np.diff(t_ns)[is_near].max(initial=0))
 
 
 def _silent_since(fresh: NDArray[np.int64], stop: int) -> int | None:
-    """Return from which cycle on no puck answers, about a stop; None = they go on."""
+    """First cycle from which on no puck answers after a stop, or None."""
     run = 0
     for i in range(max(0, stop - _SILENT_CYCLES), len(fresh)):
         run = run + 1 if fresh[i] == 0 else 0

@@ -1,6 +1,6 @@
-"""C6 and C7: the foot's own weight and a known one, in poses held by hand, arm idle.
+"""C6 and C7: the foot's own weight and a known one, in held poses, arm idle.
 
-What their recordings tell is computed in `fits`.
+Their recordings are evaluated in `fits`.
 """
 
 from collections.abc import Sequence
@@ -31,12 +31,12 @@ POSES: Sequence[Sequence[float]] = (
 )
 HUNG_AT = (0, 1, 2, 3, 5, 6)
 HUNG = 2.0  # kg
-SETTLED, AVERAGE = 1.0, 2.0  # s
+SETTLED, AVERAGE = 1.0, 2.0  # s, settling and averaging time
 _FEWEST = 100  # readings in an average
 
 
 def own_weight(scene: Scene) -> Values:
-    """Have the arm brought to eight poses; return joints and readings.
+    """Have the arm brought to eight poses; returns joints and readings.
 
     Raises:
         PreflightError: too few readings.
@@ -50,7 +50,7 @@ def own_weight(scene: Scene) -> Values:
         measured = measure(scene)
         q.append(measured[0])
         readings.append(measured[1])
-    return {"q": np.array(q), "readings": np.array(readings), **_believed(scene)}
+    return {"q": np.array(q), "readings": np.array(readings), **_nominal(scene)}
 
 
 def hung_weight(scene: Scene) -> Values:
@@ -84,14 +84,14 @@ def hung_weight(scene: Scene) -> Values:
     arrays = {name: np.array(part) for name, part in zip(names, parts, strict=True)}
     return {
         **arrays,
-        **_believed(scene),
+        **_nominal(scene),
         "hung": np.array(HUNG),
         "stops": scene.stops,
     }
 
 
-def _believed(scene: Scene) -> dict[str, Array]:
-    """Return what rig.toml says of foot and sensor."""
+def _nominal(scene: Scene) -> dict[str, Array]:
+    """Foot and sensor as in rig.toml."""
     payload, tool = scene.rig.payload, scene.rig.model.tool
     assert tool is not None
     sole = tool.sole - np.array([0.0, 0.0, tool.sensor_height])
@@ -125,40 +125,40 @@ def _hang(scene: Scene, mass: float, text: str) -> None:
 
 
 def measure(scene: Scene) -> tuple[Array, Array]:
-    """Return mean positions [rad] and readings [N, N m] of two seconds, (7,) and (6,).
+    """Mean positions [rad] and readings [N, N m] over two seconds, (7,) and (6,).
 
     Raises:
         PreflightError: too few readings.
     """
     reader = scene.loop_client.wrenches()
     scene.wait(AVERAGE)
-    sound = [
+    valid = [
         sample.wrench
         for sample in unpack_wrenches(reader.read())
         if sample.is_valid and not sample.saturated
     ]
-    if len(sound) < _FEWEST:
+    if len(valid) < _FEWEST:
         raise PreflightError(
-            f"{len(sound)} readings of the F/T sensor in {AVERAGE:g} s (at least "
+            f"{len(valid)} readings of the F/T sensor in {AVERAGE:g} s (at least "
             f"{_FEWEST}).",
             hint="Check the sensor's cable and load, then begin the step again.",
             arm_state="idle; it sinks slowly, support it",
         )
     q = scene.loop_client.last(AVERAGE)["position"].mean(axis=0)
-    return q, np.array(sound).mean(axis=0)
+    return q, np.array(valid).mean(axis=0)
 
 
 def judge_own_weight(values: Values) -> Judgement:
     """Judge axes and sign of the sensor, mass and centre of the foot, the base."""
     fit = fit_foot(values)
-    apart = 1e3 * float(np.linalg.norm(fit.centre - values["centre"]))
+    centre_error = 1e3 * float(np.linalg.norm(fit.centre - values["centre"]))
     return judged(
         [
             found("lever", 1e3 * fit.lever),
             found("force_left", fit.force_left),
             found("foot_mass", 100.0 * (fit.mass / number(values, "mass") - 1.0)),
             found("weight_way", fit.way),
-            found("foot_centre", apart),
+            found("foot_centre", centre_error),
             found("moment_left", 1e3 * fit.moment_left),
         ]
     )

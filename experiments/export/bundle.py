@@ -1,8 +1,8 @@
-"""One file for help: a ZIP archive of a session's small files and flight recordings.
+"""Support bundle: a ZIP archive of a session's small files and flight records.
 
-With them go the files that the user names, e.g. a log of the bus, and bundle.json: the
-versions of the program and its libraries, checksums, and what was left out and why.
-Nothing is hidden: names and notes of persons are in it.
+It also has the files that the user names, e.g. a log of the bus, and bundle.json: the
+versions of the program and its libraries, checksums, and omissions with reasons. Names
+and notes of persons are included.
 """
 
 import hashlib
@@ -20,8 +20,8 @@ from experiments.session.data_files import write_new
 from experiments.session.store import JOURNAL_FILE, SessionFolder, iso_utc
 
 MANIFEST = "bundle.json"
-LARGEST = 64_000_000  # bytes of a file in it
-MOST = 200_000_000  # bytes of all
+LARGEST = 64_000_000  # bytes of one file
+MOST = 200_000_000  # bytes of all files
 _OF_SESSION = (
     "session.json",
     JOURNAL_FILE,
@@ -37,18 +37,18 @@ _OF_SESSION = (
 
 @dataclass(slots=True)
 class BundleContents:
-    """What goes into a bundle.
+    """Content of a bundle.
 
     Attributes:
-        files: content by name.
-        left_out: why, by name.
+        files: content by file name.
+        left_out: reasons of omissions by file name.
     """
 
     files: dict[str, bytes] = field(default_factory=dict[str, bytes])
     left_out: dict[str, str] = field(default_factory=dict[str, str])
 
     def add(self, name: str, path: Path) -> None:
-        """Take a file, or note why it is not taken; a missing one is passed over."""
+        """Add a file, or note why it is omitted; a missing one is skipped."""
         room = min(LARGEST, MOST - sum(map(len, self.files.values())))
         try:
             self.files[name] = read_regular(path, room, is_link_followed=False)
@@ -63,12 +63,12 @@ class BundleContents:
 def write_bundle(
     folder: SessionFolder, to: Path, others: Iterable[Path]
 ) -> BundleContents:
-    """Write the bundle of a session to `to`, a new file; return what is in it.
+    """Write the bundle of a session to `to`, a new file; returns its content.
 
     Args:
         folder: the session.
         to: the archive.
-        others: files that belong to it, e.g. a log of the bus.
+        others: further files, e.g. a log of the bus.
 
     Raises:
         TrialFileError: `to` exists, or the disk is full or gone.

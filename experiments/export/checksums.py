@@ -1,4 +1,4 @@
-"""Checksums of a folder: written as `sha256sum -c` reads them, and held against it."""
+"""Checksums of a folder: written for `sha256sum -c`, and verified."""
 
 import hashlib
 import os
@@ -13,23 +13,23 @@ from experiments.session.data_files import reading, write_new
 SUMS = "SHA256SUMS"
 _LINE = re.compile(r"(?P<digest>[0-9a-f]{64})  (?P<path>[^\0\n]{1,1000})")
 _LARGEST = 16_000_000  # bytes of the list
-_MOST = 100_000  # files below a folder
+_MOST = 100_000  # files in a folder tree
 
 
 @dataclass(frozen=True, slots=True)
 class ChangedFile:
-    """One file of a folder that is not as it was written.
+    """One changed file of a folder.
 
     Attributes:
-        path: below the folder.
-        problem: what is wrong, in words.
+        path: path relative to the folder.
+        problem: description of the fault.
     """
 
     path: str
     problem: str
 
     def text(self) -> str:
-        """Return it in one line."""
+        """Return the change in one line."""
         return f"{self.path} {self.problem}"
 
 
@@ -37,7 +37,7 @@ def digest_of(path: Path) -> str:
     """Return the SHA-256 of a regular file of any size; no link is followed.
 
     Raises:
-        TrialFileError: it cannot be read, or is not a regular file.
+        TrialFileError: `path` cannot be read, or is no regular file.
     """
     with reading(path), open_regular(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
@@ -47,7 +47,7 @@ def write_sums(folder: Path) -> None:
     """Write the SHA-256 of every file below `folder`.
 
     Raises:
-        TrialFileError: a file cannot be read, or the list is there already.
+        TrialFileError: a file cannot be read, or the list exists already.
     """
     lines = [f"{digest_of(folder / name)}  {name}\n" for name in sorted(_files(folder))]
     write_new(folder / SUMS, "".join(lines).encode())
@@ -57,13 +57,13 @@ def changed_files(folder: Path) -> list[ChangedFile]:
     """Return every file below `folder` that is missing, changed or not in its list.
 
     Raises:
-        TrialFileError: the list is missing or none.
+        TrialFileError: the list is missing or invalid.
     """
     listed = _read_sums(folder / SUMS)
-    there = _files(folder) - {SUMS}
+    present = _files(folder) - {SUMS}
     changes: list[ChangedFile] = []
-    for name in sorted(set(listed) | there):
-        if name not in there:
+    for name in sorted(set(listed) | present):
+        if name not in present:
             changes.append(ChangedFile(name, "is missing"))
         elif name not in listed:
             changes.append(ChangedFile(name, f"is not in {SUMS}"))
@@ -77,7 +77,7 @@ def changed_files(folder: Path) -> list[ChangedFile]:
 
 
 def _files(folder: Path) -> set[str]:
-    """Return everything below a folder that is not a folder; links are not entered."""
+    """Return all files below a folder; links are not followed."""
     names: set[str] = set()
     for top, folders, files in os.walk(folder, followlinks=False):
         links = [name for name in folders if (Path(top) / name).is_symlink()]

@@ -1,4 +1,4 @@
-"""The RO-Crate of a publication: who did what with which files.
+"""The RO-Crate of a publication: actions, their agents and files.
 
 RO-Crate 1.1 with the Process Run Crate profile 0.5
 (https://w3id.org/ro/wfrun/process/0.5): every recording is an action of the software on
@@ -38,18 +38,18 @@ _COMMIT = re.compile("[0-9a-f]{40}")
 
 @dataclass(frozen=True, slots=True)
 class RecordingAction:
-    """How one trial was recorded.
+    """Recording of one trial.
 
     Attributes:
         name: session and trial, e.g. S012/T04.
         terrain: name of the terrain.
-        operator: who pushed.
-        started_utc: as text.
-        seconds: length of the record [s].
+        operator: name of the operator.
+        started_utc: start, as text.
+        seconds: duration of the recording [s].
         software: version that recorded it.
-        commit: of that version; "unknown" where it is not known.
-        settings: files that it was recorded with, below the crate.
-        results: files that it made, below the crate.
+        commit: commit of that version, or "unknown".
+        settings: its settings files, relative to the crate.
+        results: its resulting files, relative to the crate.
     """
 
     name: str
@@ -72,14 +72,14 @@ class RecordingAction:
 
 @dataclass(frozen=True, slots=True)
 class StudyAction:
-    """How the results were made.
+    """Computation of the results.
 
     Attributes:
-        ended_utc: as text.
-        software: version that made them.
-        commit: of that version.
-        inputs: the recordings, below the crate.
-        results: the results, below the crate.
+        ended_utc: end, as text.
+        software: version that computed them.
+        commit: commit of that version.
+        inputs: the recordings, relative to the crate.
+        results: the results, relative to the crate.
     """
 
     ended_utc: str
@@ -100,12 +100,12 @@ def crate_text(
     recordings: Sequence[RecordingAction],
     study: StudyAction,
 ) -> str:
-    """Return `ro-crate-metadata.json` for everything that lies in `folder`.
+    """Return `ro-crate-metadata.json` for all files in `folder`.
 
     Args:
-        folder: the files of the publication.
-        about: who publishes what under which licence.
-        recordings: an action for each.
+        folder: folder of the publication.
+        about: title, authors and licence.
+        recordings: actions of the recordings.
         study: the action that made the results.
 
     Raises:
@@ -120,7 +120,7 @@ def crate_text(
 
 
 class _CrateBuilder:
-    """Collects the entities of a crate; rocrate has no types of its own."""
+    """Collects the entities of a crate; rocrate is untyped."""
 
     def __init__(self, folder: Path) -> None:
         from rocrate.rocrate import ROCrate
@@ -134,7 +134,7 @@ class _CrateBuilder:
         self.tools: dict[str, Any] = {}
 
     def add_root(self, about: "Credits") -> None:
-        """Describe the whole of it."""
+        """Describe the publication."""
         root = self.crate.root_dataset
         licence = self._entity(
             about.licence.url,
@@ -162,7 +162,7 @@ class _CrateBuilder:
         root["keywords"] = list(about.keywords)
 
     def add_recording(self, recording: RecordingAction) -> None:
-        """Describe how a trial came about."""
+        """Describe the recording of a trial."""
         start, end = recording.times
         operator = recording.operator or "operator"
         self._action(
@@ -178,7 +178,7 @@ class _CrateBuilder:
         )
 
     def add_study(self, study: StudyAction) -> None:
-        """Describe how the results came about."""
+        """Describe the computation of the results."""
         self._action(
             "#study",
             self._tool(study.software, study.commit),
@@ -219,9 +219,9 @@ class _CrateBuilder:
 
     def _tool(self, software: str, commit: str) -> object:
         """Return a version of Traction; a known commit is its identifier."""
-        known = _COMMIT.fullmatch(commit) is not None
-        named = uuid.uuid5(uuid.NAMESPACE_OID, software)
-        identifier = f"swh:1:rev:{commit}" if known else f"urn:uuid:{named}"
+        is_known = _COMMIT.fullmatch(commit) is not None
+        by_name = uuid.uuid5(uuid.NAMESPACE_OID, software)
+        identifier = f"swh:1:rev:{commit}" if is_known else f"urn:uuid:{by_name}"
         if identifier not in self.tools:
             version = software.removeprefix("traction ")
             self.tools[identifier] = self._entity(
@@ -254,7 +254,7 @@ class _CrateBuilder:
 
 
 def _single(values: list[Any]) -> Any:  # noqa: ANN401
-    """Return a list of one as its element, as the profile's checks want it."""
+    """Return a list of one as its element, as the profile requires."""
     return values[0] if len(values) == 1 else values
 
 

@@ -1,4 +1,4 @@
-"""Who publishes what under which licence: DataCite, CITATION.cff, licence, readme."""
+"""Credits of a publication: DataCite, CITATION.cff, licence, readme."""
 
 import json
 import re
@@ -17,9 +17,9 @@ class Licence:
     """A licence for data.
 
     Attributes:
-        id: of SPDX.
-        name: in full.
-        url: of its text.
+        id: SPDX identifier.
+        name: full name.
+        url: address of its text.
     """
 
     id: str
@@ -56,11 +56,11 @@ LICENCES = {
 
 @dataclass(frozen=True, slots=True)
 class Author:
-    """A person or an organisation that publishes.
+    """An author: a person or an organisation.
 
     Attributes:
         name: "Family, Given" of a person, or the name of an organisation.
-        orcid: "0000-0002-1825-0097"; empty where there is none.
+        orcid: e.g. "0000-0002-1825-0097"; empty = none.
     """
 
     name: str
@@ -80,16 +80,16 @@ class Author:
 
 @dataclass(frozen=True, slots=True)
 class Credits:
-    """What a publication says of itself.
+    """Bibliographic data of a publication.
 
     Attributes:
-        title: for people.
+        title: title.
         description: a sentence or two.
-        authors: at least one.
-        licence: of the data.
-        date: of the publication, e.g. 2027-03-14.
-        software: version of Traction that made it.
-        keywords: for those who search.
+        authors: authors, at least one.
+        licence: licence of the data.
+        date: date of publication, e.g. 2027-03-14.
+        software: version of Traction that wrote it.
+        keywords: keywords.
     """
 
     title: str
@@ -107,7 +107,7 @@ class Credits:
 
 
 def parse_author(text: str) -> Author:
-    """Return the author in "Family, Given <0000-0002-1825-0097>"; the ORCID may lack.
+    """Parse an author such as "Family, Given <0000-0002-1825-0097>", ORCID optional.
 
     Raises:
         SettingsError: there is no name, or the ORCID's check digit is wrong.
@@ -140,7 +140,7 @@ def _is_orcid(text: str) -> bool:
 
 
 def datacite_json(about: Credits) -> str:
-    """Return the metadata of DataCite 4; DOI and publisher are the repository's."""
+    """Return the metadata of DataCite 4; the repository adds DOI and publisher."""
     content = {
         "schemaVersion": "http://datacite.org/schema/kernel-4",
         "doi": "",
@@ -188,7 +188,7 @@ def _creator(author: Author) -> dict[str, object]:
 
 
 def citation_cff(about: Credits) -> str:
-    """Return CITATION.cff 1.2.0 of the data; texts in JSON's quotes are YAML too."""
+    """Return CITATION.cff 1.2.0 of the data; JSON strings are valid YAML."""
     lines = [
         "cff-version: 1.2.0",
         f"message: {_quoted('If you use these data, please cite them.')}",
@@ -216,7 +216,7 @@ def citation_cff(about: Credits) -> str:
 
 
 def licence_text(about: Credits) -> str:
-    """Return which licence holds for what."""
+    """Return the content of LICENSE.md."""
     return (
         "# Licences\n\n"
         f"The recordings, tables, figures and texts of this folder: "
@@ -227,7 +227,7 @@ def licence_text(about: Credits) -> str:
 
 
 def readme_text(about: Credits, terrains: Sequence[str], trials: int) -> str:
-    """Return what is in the folder, and how it is checked and made again."""
+    """Return the content of README.md: files, verification and rebuild."""
     authors = "; ".join(author.name for author in about.authors)
     return f"""\
 # {about.title}

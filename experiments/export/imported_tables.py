@@ -1,4 +1,4 @@
-"""A data package of imported trials, as `traction export` writes one."""
+"""Data package of imported trials, in the form of `traction export`."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ from experiments.operator.console import WARNING, Console
 from experiments.session.data_files import write_new
 
 _Read = Callable[[ImportedTrial], Values]
-# From the recordings of this program: unit, frame, meaning, digits.
+# Quantities of own recordings: unit, frame, meaning, digits.
 _KNOWN = {name: q for q in QUANTITIES for name in q.names}
 _AXES = ("x", "y", "z")
-_ANGLE = 1e-6  # rad, m: finer than the encoder of any joint
+_ANGLE = 1e-6  # rad or m: finer than any joint encoder
 _INDEX_MEANINGS = {
     "table": "file of the trial at the rate of the joints",
     "log": "name of the log",
@@ -60,16 +60,16 @@ def write_imported(
     """Write the trials of a log below `to`, which must be empty.
 
     Args:
-        imported: what came of the log.
-        arguments: of the command, for `import.json`.
+        imported: the imported log.
+        arguments: arguments of the command, for `import.json`.
         to: the folder.
         form: "csv" or "parquet".
-        console: what is written is named there.
+        console: output of the written files.
 
     Raises:
-        SessionError: `to` holds something.
+        SessionError: `to` is not empty.
         TrialFileError: a table cannot be written.
-        MissingLibraryError: Parquet is wanted and pyarrow is not installed.
+        MissingLibraryError: Parquet is requested and pyarrow is not installed.
     """
     record = record_of(imported, arguments)
     make_empty(to)
@@ -138,7 +138,7 @@ def _like(
     frame: str = "",
     meaning: str = "",
 ) -> Quantity[ImportedTrial]:
-    """Return a quantity with the unit and digits of one of this program's own."""
+    """Return a quantity with unit and digits of an own quantity `known`."""
     q = _KNOWN[known]
     return Quantity(
         names,
@@ -155,7 +155,7 @@ def _like(
 def _write_trial(
     writer: TableWriter, imported: ImportedLog, trial: ImportedTrial, digest: str
 ) -> str:
-    """Write both tables of a trial; return the file of the whole one."""
+    """Write both tables of a trial; returns the file of the complete one."""
     request, series = imported.request, trial.series
     origin = TableOrigin(
         table="trial",
@@ -180,7 +180,7 @@ def _write_trial(
 
 
 def record_of(imported: ImportedLog, arguments: Mapping[str, str]) -> ImportRecord:
-    """Return what `import.json` says of an import; raises SettingsError."""
+    """Return the content of `import.json`; raises SettingsError."""
     request = imported.request
     files = [("log", path) for path in log_files(request.log)]
     files.append(("urdf", request.urdf))

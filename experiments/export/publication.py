@@ -1,6 +1,6 @@
-"""A study as a folder to publish: recordings, tables, results, and where they are from.
+"""Publication of a study: a folder of recordings, tables, results and provenance.
 
-The folder is a data folder of Traction too: `--data` takes it.
+The folder is also a data folder of Traction: `--data` accepts it.
 """
 
 import json
@@ -45,20 +45,20 @@ SESSIONS, TABLES, RESULTS = "sessions", "tables", "results"
 ANALYSIS = f"{RESULTS}/analysis.json"  # the choices that a rebuild needs
 TABLE = f"{RESULTS}/fits.csv"
 _RECORDINGS = ("trials", "rejected")
-_FOLDERS = ("", *_RECORDINGS)  # of a session; faults/ stays
+_FOLDERS = ("", *_RECORDINGS)  # copied folders of a session, without faults/
 _LEFT = (".lock", ".tmp", ".partial")
 _SETTINGS = ("config.toml", "matrix.toml")
 
 
 @dataclass(frozen=True, slots=True)
 class PublishRequest:
-    """What the person who publishes decides.
+    """Options of a publication.
 
     Attributes:
-        title: of the publication; "" = from the terrains.
-        description: "" = from the trials.
-        authors: at least one.
-        licence: of the data.
+        title: title; "" = from the terrains.
+        description: description; "" = from the trials.
+        authors: authors, at least one.
+        licence: licence of the data.
     """
 
     title: str
@@ -78,16 +78,16 @@ def publish_sessions(
     """Write sessions, their tables and results as an RO-Crate below `to`.
 
     Args:
-        sessions: of one kind; their kept trials have been held against the journal.
-        data: the data folder; finished folds are kept there.
+        sessions: sessions of one kind, verified against their journals.
+        data: the data folder, for finished folds.
         to: a new or empty folder.
-        order: how the results are made.
-        request: who publishes, and under which licence.
-        console: what is written is named there.
+        order: options of the report.
+        request: options of the publication.
+        console: output of the written files.
 
     Raises:
         MissingLibraryError: rocrate is not installed.
-        SessionError: `to` holds something, or there is no kept trial.
+        SessionError: `to` is not empty, or there is no kept trial.
         TrialFileError: a file cannot be read or written.
     """
     require_extra("report")
@@ -123,7 +123,7 @@ def _write_texts(
     code: Mapping[str, str],
     trials: Collection[RecordedTrial],
 ) -> None:
-    """Write what people and repositories read first."""
+    """Write readme, licence, citation and metadata files."""
     terrains = list(dict.fromkeys(trial.terrain for trial in trials))
     terrain_order = list(order.terrains)
     choices = {"version": FORMAT, "seed": order.seed, "terrains": terrain_order}
@@ -140,9 +140,9 @@ def _write_texts(
 
 
 def _copy_session(session: SessionFolder, to: Path) -> SessionFolder:
-    """Copy what a session recorded, in line with its journal.
+    """Copy the recordings of a session, in line with its journal.
 
-    Nothing that leads out of it is copied.
+    Links out of the session are not copied.
     """
     copy = replace(session, path=to / session.path.name)
     for name in _FOLDERS:
@@ -196,7 +196,7 @@ def _recording(to: Path, path: Path, trial: RecordedTrial) -> RecordingAction:
 
 
 def _environment(code: Mapping[str, str]) -> str:
-    """Return the code and every installed package, one a line."""
+    """Return code version and installed packages, one per line."""
     packages = sorted(
         {
             f"{package.metadata['Name']}=={package.version}"

@@ -1,6 +1,6 @@
-"""What the tables of a trial hold: every column, its unit, meaning and resolution.
+"""Columns of the tables of a trial: unit, meaning and resolution.
 
-A number is written to a tenth of what its instrument resolves: a finer digit is noise.
+A number is written to a tenth of its instrument's resolution: finer digits are noise.
 """
 
 from collections.abc import Callable
@@ -22,15 +22,15 @@ _JOINTS = tuple(str(joint) for joint in range(1, 8))
 _AXES = ("x", "y", "z")
 _BASE, _TERRAIN, _LOOP = "arm's base", "terrain", "loop"
 _SAFETY_MODE = 0b111  # bits of the flags
-# What one count of an instrument, or its noise in one sample, amounts to.
-_CLOCK = 1e-5  # s: a cycle begins 10 us early or late
+# Resolutions: one count of an instrument, or its noise in one sample.
+_CLOCK = 1e-5  # s: jitter of the start of a cycle
 _ANGLE = 3.6e-5  # rad: 4096 counts a turn of the motor, geared 42 to 1
 _JOINT_SPEED = 1.6e-4  # rad/s: a tenth of a count in 22 ms, the width of the average
 _TORQUE = 8.5e-4  # N m: a count of motor 7's current, 14.93 / 17474
 _FORCE = 4e-3  # N: 1/256 N, a count of the finest gauges that are supported
-_MOMENT = 2.5e-4  # N m: 1/4096 N m, the same
+_MOMENT = 2.5e-4  # N m: 1/4096 N m, likewise
 _POSITION = 3.6e-5  # m: a count of a joint at a reach of 1 m
-_SPEED = 1.6e-4  # m/s: as of the joints; the slowest velocity that counts is 5e-3
+_SPEED = 1.6e-4  # m/s: as of the joints; the slowest kept velocity is 5e-3
 _Recorded = Callable[[RecordedTrial], Values]
 
 
@@ -39,7 +39,7 @@ KeptQuantity = Quantity[PreparedTrial]
 
 
 def kept_rule(options: PrepareOptions) -> str:
-    """Return in words which samples are kept."""
+    """Describe the rule for kept samples."""
     return (
         f"centred moving average of {options.smoothing} samples at 500 Hz "
         f"({2 * options.smoothing} ms), then one sample of {options.downsample} "
@@ -77,8 +77,8 @@ def _safety_modes(trial: RecordedTrial) -> Values:
 
 
 def _mode_word(code: int) -> str:
-    known = {mode.value: mode.name.lower().replace("_", "-") for mode in SafetyMode}
-    return known.get(code, known[SafetyMode.UNKNOWN])
+    names = {mode.value: mode.name.lower().replace("_", "-") for mode in SafetyMode}
+    return names.get(code, names[SafetyMode.UNKNOWN])
 
 
 SAFETY_MODES = tuple(dict.fromkeys(map(_mode_word, range(_SAFETY_MODE + 1))))
@@ -204,7 +204,7 @@ QUANTITIES: tuple[TrialQuantity, ...] = (
         _traction(0),
         _SPEED,
         "number",
-        more_digits=2,  # a sample at an edge of the window stays on its side of it
+        more_digits=2,  # keeps a sample at an edge of the window on its side
     ),
     _number(
         "F_t",
@@ -224,8 +224,8 @@ QUANTITIES: tuple[TrialQuantity, ...] = (
 
 
 def _kept(name: str, values: Callable[[PreparedTrial], Values]) -> KeptQuantity:
-    """Return a column of the kept samples: as of the whole trial, but smoothed."""
-    (quantity,) = (each for each in QUANTITIES if each.names == (name,))
+    """Return a column of the kept samples: that of the trial, smoothed."""
+    (quantity,) = (q for q in QUANTITIES if q.names == (name,))
     meaning = quantity.meaning if name == "t" else f"{quantity.meaning}; smoothed"
     return Quantity(
         quantity.names,
@@ -238,7 +238,7 @@ def _kept(name: str, values: Callable[[PreparedTrial], Values]) -> KeptQuantity:
     )
 
 
-# Smoothed, thinned and inside the window of velocities: what models are fitted to.
+# Samples that models are fitted to: smoothed, thinned, inside the velocity window.
 KEPT: tuple[KeptQuantity, ...] = (
     _kept("t", lambda x: x.smooth.t[x.indices]),
     _kept("v_t", lambda x: x.v_t),

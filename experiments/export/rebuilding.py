@@ -1,4 +1,4 @@
-"""The table of a publication computed once more from its recordings."""
+"""Rebuild the table of a publication from its recordings."""
 
 import csv
 import math
@@ -25,19 +25,19 @@ from experiments.session.data_files import read_json, reading
 from experiments.session.store import list_sessions
 
 TOLERANCE = 1e-9  # relative
-_ABSOLUTE = 1e-12  # of values that are nothing but rounding
+_ABSOLUTE = 1e-12  # absolute, for values that are pure rounding
 _LARGEST = 64_000_000  # bytes of a table
 _KEY_COLUMNS = ("terrain", "model", "fold", "quantity", "unit")
 
 
 @dataclass(frozen=True, slots=True)
 class TableComparison:
-    """A table that was computed again beside the one that is published.
+    """Comparison of a rebuilt table with the published one.
 
     Attributes:
-        rows: that were compared.
+        rows: number of compared rows.
         worst: largest relative difference of two numbers.
-        different: rows that differ by more than the tolerance, in words.
+        different: descriptions of the rows that differ by more than the tolerance.
     """
 
     rows: int
@@ -48,11 +48,11 @@ class TableComparison:
 def rebuild(folder: Path, console: Console) -> TableComparison:
     """Compute the table of results from the recordings alone, and compare.
 
-    Nothing of an earlier run is used, and nothing is written into the folder.
+    No stored results are used, and nothing is written into the folder.
 
     Raises:
-        SettingsError: the folder is of another version, or does not state how its
-            results were made.
+        SettingsError: the folder has another version, or lacks the options of its
+            results.
         TrialFileError: a file cannot be read.
         SessionError: there is no kept trial.
     """
@@ -79,7 +79,7 @@ def rebuild(folder: Path, console: Console) -> TableComparison:
 
 
 def compare_tables(published: str, again: str) -> TableComparison:
-    """Return where two tables in the form of fits.csv differ."""
+    """Compare two tables in the form of fits.csv."""
     worst, count = 0.0, 0
     different: list[str] = []
     for ours, theirs in zip_longest(_rows(published), _rows(again)):
@@ -87,20 +87,20 @@ def compare_tables(published: str, again: str) -> TableComparison:
         if ours is None or theirs is None or ours[0] != theirs[0]:
             different.append(f"row {count} is {theirs}, published is {ours}")
             continue
-        one, other = ours[1], theirs[1]
-        if one == other or (math.isnan(one) and math.isnan(other)):
+        value, other = ours[1], theirs[1]
+        if value == other or (math.isnan(value) and math.isnan(other)):
             continue
-        scale = max(abs(one), abs(other))
-        if not math.isclose(one, other, rel_tol=TOLERANCE, abs_tol=_ABSOLUTE):
+        scale = max(abs(value), abs(other))
+        if not math.isclose(value, other, rel_tol=TOLERANCE, abs_tol=_ABSOLUTE):
             label = " ".join(filter(None, ours[0]))
-            different.append(f"{label}: {other!r}, published is {one!r}")
+            different.append(f"{label}: {other!r}, published is {value!r}")
         if scale > _ABSOLUTE / TOLERANCE:
-            worst = max(worst, abs(one - other) / scale)
+            worst = max(worst, abs(value - other) / scale)
     return TableComparison(count, worst, different)
 
 
 def _rows(text: str) -> Iterator[tuple[tuple[str, ...], float]]:
-    """Give (key, value) of every row."""
+    """Yield (key, value) of every row."""
     for row in csv.DictReader(text.splitlines()):
         try:
             value = float(row["value"])

@@ -1,7 +1,7 @@
-"""Recordings as standard ROS 2 topics, one message a cycle.
+"""Export of recordings as standard ROS 2 topics, one message per cycle.
 
-A recording has them as views at 50 Hz beside `/cycle`, which says all of it at 500 Hz;
-they are made again from there, so that a recording need not hold everything twice.
+A recording has these topics only as views at 50 Hz, along with `/cycle` at 500 Hz; the
+export computes them from `/cycle` at the full rate.
 """
 
 from collections.abc import Generator, Mapping, Sequence
@@ -26,25 +26,25 @@ from ft_sensor.calibration.files import payload_from_toml
 _DESCRIPTION, _URDF = "/robot_description", "robot.urdf"
 _CALIBRATION = "ft_calibration.toml"
 STANDARD_TOPICS = {_DESCRIPTION: "std_msgs/msg/String", **VIEW_TOPICS}
-RECORDING = "recording"  # metadata record: that of the trial, and its SHA-256
+RECORDING = "recording"  # metadata record of the trial, with its SHA-256
 
 
 def export_standard_topics(
     sessions: Sequence[SessionFolder], to: Path, console: Console
 ) -> None:
-    """Write the kept trials of `sessions` below `to`, which must be empty.
+    """Write the kept trials of `sessions` to the empty folder `to`.
 
     Per trial an MCAP file of `STANDARD_TOPICS` at the recorded rate, which programs
-    without traction_msgs play, and checksums. Metadata and attachments are those of
+    without traction_msgs can play, and checksums. Metadata and attachments are those of
     the recording.
 
     Args:
-        sessions: their kept trials are written.
+        sessions: the sessions.
         to: the folder.
-        console: what is written is named there.
+        console: output of the written files.
 
     Raises:
-        SessionError: `to` holds something, or no session has a kept trial.
+        SessionError: `to` is not empty, or no session has a kept trial.
         TrialFileError: a trial cannot be read, or a file cannot be written.
     """
     paths = [(session, path) for session in sessions for path in session.kept_trials()]
@@ -74,7 +74,7 @@ def standard_topics(trial: TrialReader) -> bytes:
 def description(attachments: Mapping[str, bytes]) -> str:
     """Return the arm's URDF with the frames `ft_sensor` and `sole` of a recording.
 
-    Without them where the calibration or the sensor's height is not recorded.
+    Without these frames if the calibration or the sensor's height is not recorded.
     """
     urdf = attachments[_URDF].decode(errors="replace")
     height = sensor_height_of(attachments.get("config.toml", b""))

@@ -1,4 +1,4 @@
-"""Columns of a table: unit, meaning, and digits from what the instrument resolves."""
+"""Columns of a table: unit, meaning, and digits from the instrument's resolution."""
 
 import csv
 import io
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 Values = NDArray[np.generic]
 Source = TypeVar("Source")
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # how a formula begins
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # first characters of a formula
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,15 +20,14 @@ class Quantity(Generic[Source]):
     """One or more columns of a table.
 
     Attributes:
-        names: of the columns.
-        unit: of all of them; "" for words.
-        frame: where they are measured.
-        meaning: what they are.
-        values: takes them from a trial, shape (n,) or (n, columns).
-        resolution: of the instrument, in the unit; 0 for whole numbers and words.
+        names: names of the columns.
+        unit: unit of all columns; "" for words.
+        frame: frame of the measurement.
+        meaning: description.
+        values: extracts the values from a trial, shape (n,) or (n, columns).
+        resolution: resolution of the instrument, in the unit; 0 for integers and words.
         kind: "number", "integer", "boolean" (0 or 1 in a CSV) or "string".
-        more_digits: beyond those of the resolution, where more than noise depends on
-            the value.
+        more_digits: digits beyond those of the resolution.
     """
 
     names: tuple[str, ...]
@@ -42,21 +41,21 @@ class Quantity(Generic[Source]):
 
     @property
     def decimals(self) -> int:
-        """Digits behind the point: one step is a tenth of the resolution or less."""
+        """Number of decimals: one step is a tenth of the resolution or less."""
         return decimals_of(self.resolution) + self.more_digits
 
 
 @dataclass(frozen=True, slots=True)
 class TableColumn:
-    """One column with its values as they are written.
+    """One column with its values as written.
 
     Attributes:
-        name: without its unit.
+        name: name without unit.
         unit: "" for words.
-        kind: as that of `Quantity`.
-        meaning: what it is.
-        decimals: digits behind the point; 0 for what is no measured number.
-        values: of every row, shape (n,).
+        kind: as in `Quantity`.
+        meaning: description.
+        decimals: number of decimals; 0 unless a measured number.
+        values: values of all rows, shape (n,).
     """
 
     name: str
@@ -72,7 +71,7 @@ class TableColumn:
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
     def cells(self) -> list[str]:
-        """Return the values as text: NaN where there is none, 0 or 1 for booleans."""
+        """Return the values as text: NaN for missing ones, 0 or 1 for booleans."""
         if self.kind == "boolean":
             return [str(int(value)) for value in self.values.tolist()]
         if self.kind != "number":
@@ -82,11 +81,11 @@ class TableColumn:
 
 
 def decimals_of(resolution: float) -> int:
-    """Return how many digits behind the point a tenth of `resolution` needs.
+    """Number of decimals that a tenth of `resolution` needs.
 
-    Rounding errs by a twentieth of the resolution at most. It adds a hundredth at most
-    to the variance of a value that is uniform in one step of the instrument: both
-    variances are step^2 / 12.
+    The rounding error is at most a twentieth of the resolution. It adds at most a
+    hundredth to the variance of a value that is uniform in one step of the instrument:
+    both variances are step^2 / 12.
     """
     return max(0, math.ceil(-math.log10(resolution / 10.0))) if resolution else 0
 
@@ -97,14 +96,14 @@ def columns_of(
     """Return the columns of a trial, in the order of `quantities`.
 
     Args:
-        quantities: what the columns hold.
-        trial: where their values are taken from.
-        is_rounded: numbers are those of a table; otherwise as recorded.
+        quantities: the quantities.
+        trial: source of the values.
+        is_rounded: round numbers as in a table; otherwise as recorded.
     """
     return [
         column
-        for each in quantities
-        for column in _columns(each, trial, is_rounded=is_rounded)
+        for quantity in quantities
+        for column in _columns(quantity, trial, is_rounded=is_rounded)
     ]
 
 
@@ -132,7 +131,7 @@ def csv_of(columns: Sequence[TableColumn]) -> str:
 
 
 def csv_of_rows(rows: Sequence[Sequence[str]]) -> str:
-    """Return rows of text as CSV that no spreadsheet takes for formulas."""
+    """Return rows of text as CSV, escaped against formulas in spreadsheets."""
     text = io.StringIO()
     plain = [[plain_cell(cell) for cell in row] for row in rows]
     csv.writer(text, lineterminator="\n").writerows(plain)
@@ -140,7 +139,7 @@ def csv_of_rows(rows: Sequence[Sequence[str]]) -> str:
 
 
 def plain_cell(cell: str) -> str:
-    """Return a text that no spreadsheet takes for a formula; numbers stay."""
+    """Escape a text that a spreadsheet would take for a formula."""
     try:
         float(cell)
     except ValueError:

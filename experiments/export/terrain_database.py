@@ -1,4 +1,4 @@
-"""The terrain database of recorded sessions, for programs that know no sessions."""
+"""Export of the terrain database of recorded sessions."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -24,14 +24,14 @@ def export_terrains(
     request: ReportRequest,
     console: Console,
 ) -> None:
-    """Write a terrain database of all models of the sessions' terrains to `out`.
+    """Write the terrain database of the sessions to `out`.
 
     Raises:
         SessionError: no session has a kept trial.
         TrialFileError: `out` exists or cannot be written.
     """
-    judged = FitOptions(seed=request.seed, models=(GP_SE, GP_SE_TRIAL), draws=0)
-    analysed = study_sessions(sessions, data, request, console, judged)
+    fit = FitOptions(seed=request.seed, models=(GP_SE, GP_SE_TRIAL), draws=0)
+    analysed = study_sessions(sessions, data, request, console, fit)
     study = analysed.study
     options = replace(
         study.options, fit=FitOptions(seed=request.seed, models=EXPORTED, draws=0)

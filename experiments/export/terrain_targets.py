@@ -1,4 +1,4 @@
-"""Terrains of a database for other programs: read, made, and only then written."""
+"""Export of a terrain database for other programs."""
 
 import hashlib
 from dataclasses import dataclass
@@ -16,14 +16,14 @@ from experiments.session.data_files import write_new
 
 @dataclass(frozen=True, slots=True)
 class TargetRequest:
-    """What is exported for whom.
+    """Options of an export of terrains.
 
     Attributes:
-        database: file of the terrains.
-        targets: names of the programs.
+        database: file of the terrain database.
+        targets: names of the target programs.
         to: the folder, empty or new.
-        terrains: names; all where empty.
-        model: its name; "" = the default.
+        terrains: names of the terrains; empty = all.
+        model: name of the model; "" = the default.
         is_float: single precision in C.
     """
 
@@ -36,12 +36,12 @@ class TargetRequest:
 
 
 def export_for(request: TargetRequest, console: Console) -> None:
-    """Write the folder of every target below the one that is asked for.
+    """Write the folder of every target.
 
     Raises:
         MissingLibraryError: a target needs a library that is not installed.
         SettingsError: the database cannot be read or has no such terrain or model.
-        SessionError: the folder holds something.
+        SessionError: the folder is not empty.
         TrialFileError: a file cannot be written.
     """
     for name in request.targets:
@@ -56,9 +56,9 @@ def export_for(request: TargetRequest, console: Console) -> None:
         request.model,
         is_float=request.is_float,
     )
-    made = {name: target_files(name, export) for name in request.targets}
+    outputs = {name: target_files(name, export) for name in request.targets}
     make_empty(request.to)
-    for name, files in made.items():
+    for name, files in outputs.items():
         for path, data in files.items():
             file = request.to / name / path
             file.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Trials as tables that any program reads: CSV or Parquet, dictionary, data package."""
+"""Export of trials as tables: CSV or Parquet, data dictionary, data package."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -69,12 +69,12 @@ _INDEX_MEANINGS = {
 
 @dataclass(slots=True)
 class TableWriter:
-    """Writes tables below one folder and remembers them for the data package.
+    """Writes tables into a folder and lists them for the data package.
 
     Attributes:
-        folder: where they go.
-        form: "csv" or "parquet", of the tables of trials.
-        files: what was written.
+        folder: the folder.
+        form: "csv" or "parquet", for the tables of trials.
+        files: the written files.
     """
 
     folder: Path
@@ -84,7 +84,7 @@ class TableWriter:
     def add(
         self, name: str, columns: Sequence[TableColumn], origin: TableOrigin, about: str
     ) -> str:
-        """Write a table of a trial and return its path below the folder."""
+        """Write a table of a trial; returns its path relative to the folder."""
         file = f"{name}.{self.form}"
         if self.form == "csv":
             content = csv_of(columns).encode()
@@ -107,7 +107,7 @@ class TableWriter:
         meanings: Mapping[str, str],
         about: str,
     ) -> None:
-        """Write a CSV of words; `meanings` are those of its columns, in order."""
+        """Write a CSV of texts; `meanings` describes its columns, in order."""
         content = csv_of_rows([tuple(meanings), *rows]).encode()
         fields = [
             PackageField(name=name, type="string", description=text)
@@ -159,28 +159,28 @@ class TableWriter:
 def export_sessions(
     sessions: Sequence[SessionFolder], to: Path, form: str, console: Console
 ) -> None:
-    """Write the kept trials of `sessions` below `to`, which must be empty.
+    """Write the kept trials of `sessions` to the empty folder `to`.
 
     Per trial a table at 500 Hz and one of the kept samples; an index of the trials, a
-    data dictionary, a Frictionless data package, and checksums that `sha256sum -c`
-    reads. `traction fit` and `traction.load_tables` read the folder.
+    data dictionary, a Frictionless data package, and checksums for `sha256sum -c`.
+    `traction fit` and `traction.load_tables` read the folder.
 
     Args:
-        sessions: their kept trials are written.
+        sessions: the sessions.
         to: the folder.
         form: "csv" or "parquet".
-        console: what is written is named there.
+        console: output of the written files.
 
     Raises:
-        SessionError: `to` holds something, or no session has a kept trial.
+        SessionError: `to` is not empty, or no session has a kept trial.
         TrialFileError: a trial cannot be read, or a table cannot be written.
-        MissingLibraryError: Parquet is wanted and pyarrow is not installed.
+        MissingLibraryError: Parquet is requested and pyarrow is not installed.
     """
     paths = [(session, path) for session in sessions for path in session.kept_trials()]
     if not paths:
         raise SessionError(f"{', '.join(s.id for s in sessions)}: no kept trials.")
     if form != "csv":
-        to_parquet({}, {})  # refused before anything is written
+        to_parquet({}, {})  # raises if pyarrow is missing
     make_empty(to)
     writer = TableWriter(to, form)
     rows: list[list[str]] = []
@@ -194,8 +194,8 @@ def export_sessions(
         console.say(f"{name}: {len(trial.t)} rows")
     columns = _factor_columns(stated)
     for row, factors in zip(rows, stated, strict=True):
-        known = factors.values
-        row += [value_text(known[n], 12) if n in known else "" for n in columns]
+        values = factors.values
+        row += [value_text(values[n], 12) if n in values else "" for n in columns]
     index = {**_INDEX_MEANINGS, **columns}
     writer.add_texts(INDEX, rows, index, "The trials.")
     meanings = dictionary_rows(form, index)
@@ -209,10 +209,10 @@ def export_sessions(
 
 
 def _factor_columns(stated: Sequence[StatedFactors]) -> dict[str, str]:
-    """Return the factors of trials by name with what each is; {} where none has any."""
-    units = {name: unit for each in stated for name, unit in each.units.items()}
-    names = dict.fromkeys(name for each in stated for name in each.values)
-    if not set(names) - {FOOT}:  # the column `tread` tells it
+    """Return the factors of trials with their descriptions; {} without factors."""
+    units = {name: unit for trial in stated for name, unit in trial.units.items()}
+    names = dict.fromkeys(name for trial in stated for name in trial.values)
+    if not set(names) - {FOOT}:  # the column `tread` states it
         return {}
     about = {
         name: f"factor [{unit}]" if unit else "factor" for name, unit in units.items()
@@ -223,7 +223,7 @@ def _factor_columns(stated: Sequence[StatedFactors]) -> dict[str, str]:
 def _write_trial(
     writer: TableWriter, name: str, session: SessionFolder, trial: RecordedTrial
 ) -> list[str]:
-    """Write both tables of a trial; return its row of the index."""
+    """Write both tables of a trial; returns its row of the index."""
     recording = digest_of(trial.path)
     series = trial.series()
     options = PrepareOptions(container_travel=trial.frame.travel)
@@ -251,14 +251,14 @@ def _write_trial(
 
 
 def dictionary_rows(form: str, index: Mapping[str, str]) -> list[list[str]]:
-    """Return what every column of every table means, a row each.
+    """Return the rows of the data dictionary, one per column of every table.
 
-    The resolution is that of the instrument, the largest rounding what was lost when
-    the number was written, both in the unit of the column.
+    Resolution of the instrument and largest rounding error are in the unit of the
+    column.
 
     Args:
-        form: of the tables of trials, "csv" or "parquet".
-        index: what the columns of the index are.
+        form: form of the tables of trials, "csv" or "parquet".
+        index: descriptions of the columns of the index.
     """
     rows = column_rows(f"T01.{form}", QUANTITIES)
     rows += column_rows(f"T01.kept.{form}", KEPT)
@@ -272,7 +272,7 @@ def dictionary_rows(form: str, index: Mapping[str, str]) -> list[list[str]]:
 
 
 def column_rows(table: str, quantities: Sequence[Quantity[Any]]) -> list[list[str]]:
-    """Return what every column of a table means, a row each."""
+    """Return the rows of the data dictionary for one table."""
     rows: list[list[str]] = []
     for q in quantities:
         is_number = q.kind == "number"
@@ -283,11 +283,11 @@ def column_rows(table: str, quantities: Sequence[Quantity[Any]]) -> list[list[st
 
 
 def make_empty(folder: Path) -> None:
-    """Make a folder that is new or empty.
+    """Create a folder, or accept an empty one.
 
     Raises:
-        SessionError: it holds something.
-        TrialFileError: it cannot be made.
+        SessionError: the folder is not empty.
+        TrialFileError: the folder cannot be created.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""What has to be in a publication, by its description and by the journals inside."""
+"""Verification of a publication by checksums, its description and its journals."""
 
 from pathlib import Path
 from typing import cast
@@ -13,41 +13,41 @@ from experiments.session.kept_files import compare_kept
 from experiments.session.store import list_sessions
 
 _LARGEST = 64_000_000  # bytes of the description
-_MOST = 100_000  # files and others that it names
+_MOST = 100_000  # entities in the description
 
 
 def changed_publication(folder: Path) -> list[ChangedFile]:
-    """Return every file of a publication that is missing or not as it was written.
+    """Return the missing and changed files of a publication.
 
-    A list of checksums from which a line was taken says nothing of that file; the
-    description of the crate and the journals of its sessions still name it.
+    A file whose line was removed from the list of checksums is still named by the
+    description of the crate and by the journals.
 
     Raises:
-        TrialFileError: the list is missing or none, or the description is none.
+        TrialFileError: the list is missing or invalid, or the description is invalid.
     """
     changes = changed_files(folder)
-    known = {change.path for change in changes}
-    if METADATA not in known and not (folder / METADATA).is_file():
+    reported = {change.path for change in changes}
+    if METADATA not in reported and not (folder / METADATA).is_file():
         changes.append(ChangedFile(METADATA, "is missing"))
-        known.add(METADATA)
-    # a description that was changed itself is no witness
-    for name in [] if METADATA in known else _described(folder / METADATA):
-        if name not in known and not (folder / name).is_file():
+        reported.add(METADATA)
+    # a changed description is no evidence
+    for name in [] if METADATA in reported else _described(folder / METADATA):
+        if name not in reported and not (folder / name).is_file():
             changes.append(ChangedFile(name, f"is missing; {METADATA} names it"))
-            known.add(name)
+            reported.add(name)
     for session in list_sessions(folder):
         for deviation in compare_kept(session):
             path = str((session.path / deviation.file).relative_to(folder))
-            if path not in known:
+            if path not in reported:
                 changes.append(ChangedFile(path, deviation.problem))
-                known.add(path)
+                reported.add(path)
     return changes
 
 
 def _described(path: Path) -> list[str]:
-    """Return the files below the crate that its description names.
+    """Return the files of the crate that its description names.
 
-    Its identifiers are addresses: "+" and other signs are written in percent.
+    Its identifiers are URIs, with "+" and other characters percent-encoded.
     """
     with reading(path):
         content = parse_object(read_regular(path, _LARGEST))
@@ -58,14 +58,14 @@ def _described(path: Path) -> list[str]:
         raise TrialFileError(path, f"describes more than {_MOST} things")
     names: list[str] = []
     for entity in cast("list[object]", graph):
-        known = cast("dict[str, object]", entity if isinstance(entity, dict) else {})
-        name = known.get("@id") if known.get("@type") == "File" else None
+        fields = cast("dict[str, object]", entity if isinstance(entity, dict) else {})
+        name = fields.get("@id") if fields.get("@type") == "File" else None
         if isinstance(name, str) and _is_below(file := unquote(name)):
             names.append(file)
     return names
 
 
 def _is_below(name: str) -> bool:
-    """Return whether a name is that of a file below the crate, and no address."""
+    """Return whether a name is that of a file in the crate, not a URL."""
     path = Path(name)
     return ":" not in name and not path.is_absolute() and ".." not in path.parts

@@ -1,6 +1,6 @@
-"""The person at the rig: prompts, keys, screens, sounds; and one who is simulated.
+"""The operator's interface: prompts, keys, screens, sounds; real or simulated.
 
-`prompts` says what can be asked and which keys answer it, `terminal` and `scripted`
-give the answers, `screens` is what is shown, `console` imports rich; `pendant` and
-`hand_orders` read what the hands at a served arm are to do. Begin with `prompts`.
+`prompts` defines the prompts and `keys` their keys, `terminal` and `scripted` supply
+answers, `screens` renders the screens, `console` imports rich; `pendant` and
+`hand_orders` parse orders to the hands at a served arm. Begin with `prompts`.
 """

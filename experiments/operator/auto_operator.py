@@ -1,4 +1,4 @@
-"""The automatic operator of a rehearsal, who is no person."""
+"""The automatic operator of a rehearsal."""
 
 from __future__ import annotations
 
@@ -7,31 +7,31 @@ from collections.abc import Callable
 from acquisition.simulation import ENDS
 from experiments.operator.prompts import Prompt, PromptState
 
-DAMPED_SECONDS = 0.5  # after a fault of motion, until it lets the arm hold again [s]
-LAID_DOWN_SECONDS = 1.0  # until it has the arm, before that goes idle [s]
-TOUCHES = 12  # points that are touched
-TOUCH_SECONDS = 9.0  # until the foot is at rest on a point [s]
-READY_SECONDS = 2.2  # until it is at rest before a trial [s]
-AUTO_ATTEMPTS = 8  # at one trial, before it gives up
-AUTO_PATIENCE = 60.0  # for a foot that is never lifted and still [s]
+DAMPED_SECONDS = 0.5  # from a motion fault until it lets the arm hold again [s]
+LAID_DOWN_SECONDS = 1.0  # until it supports the arm, which then goes idle [s]
+TOUCHES = 12  # points to touch
+TOUCH_SECONDS = 9.0  # until the foot rests on a point [s]
+READY_SECONDS = 2.2  # until the foot rests before a trial [s]
+AUTO_ATTEMPTS = 8  # attempts at one trial before it gives up
+AUTO_PATIENCE = 60.0  # time-out for a foot to be lifted and still [s]
 
 
 class AutoOperator:
-    """Presses the obvious key: space when ready, keep what is complete.
+    """Presses the obvious key: space when ready, keep for a complete trial.
 
-    It gives up where a person would: a rehearsal must come to an end.
+    Gives up where a person would, so that a rehearsal comes to an end.
     """
 
     draft = ""
     who = "auto"
 
     def answer(self, state: PromptState) -> str:
-        """Return a key as soon as it makes sense."""
+        """Return the obvious key of the prompt, after a realistic delay."""
         answer = _AUTOMATIC.get(state.prompt)
         return answer(state) if answer is not None else ""
 
     def line(self, state: PromptState) -> str | None:
-        """Return nothing: it never has anything to note."""
+        """Return an empty note."""
         del state
         return ""
 
@@ -51,7 +51,7 @@ def _review_key(state: PromptState) -> str:
 
 
 def _touch_key(state: PromptState) -> str:
-    """Touch a dozen points, each until the foot is at rest."""
+    """Touch a dozen points, each until the foot rests."""
     if state.since < TOUCH_SECONDS:
         return ""
     return "d" if TOUCHES < state.trial <= ENDS else " "

@@ -1,4 +1,4 @@
-"""Output to the operator: the one place that prints."""
+"""Output to the operator: the only module that prints."""
 
 import errno
 import io
@@ -18,14 +18,14 @@ GOOD, WARNING, BAD = "✔", "▲", "✘"
 AddLine = Callable[[str, str, str], None]  # mark, name and text of a graded line
 _GRADES = {GOOD: "good", WARNING: "warning", BAD: "bad"}
 _ARM, _ARM_WHOLE = "ARM: ", "ARM:\N{NO-BREAK SPACE}"
-_BELOW_TEXT = " " * 18  # where the text of a graded line begins
+_BELOW_TEXT = " " * 18  # indent of the text of a graded line
 
 
 class OutputError(TractionError):
-    """What a command prints cannot be written.
+    """The output of a command cannot be written.
 
     Args:
-        error: of the system.
+        error: error of the operating system.
     """
 
     exit_code = 6
@@ -38,16 +38,16 @@ class OutputError(TractionError):
 
 
 class Console:
-    """Prints lines, and below them a panel that changes, where there is a terminal.
+    """Prints lines, and on a terminal a changing panel below them.
 
     Args:
-        color: colours and a panel are wanted, where there is a terminal for them.
-        goes_on: output that cannot be written is told once and ends nothing, because an
-            arm is moved, or trials are recorded.
+        color: use colours and a panel on a terminal.
+        goes_on: report a failure of the output once and go on, because an arm moves or
+            trials are recorded.
 
     Attributes:
-        is_lost: the other end of the pipe was closed.
-        is_live: there is a terminal that can show a panel.
+        is_lost: whether the other end of the pipe was closed.
+        is_live: whether there is a terminal that can show a panel.
     """
 
     def __init__(self, *, color: bool = True, goes_on: bool = False) -> None:
@@ -59,17 +59,19 @@ class Console:
         self._live: Live | None = None
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, io.TextIOWrapper):
-                stream.reconfigure(errors="replace")  # a sign is worth no crash
+                stream.reconfigure(
+                    errors="replace"
+                )  # an unprintable character must not crash
 
     def say(self, text: str = "", *, indent: str = "") -> None:
-        """Print one line; a closed pipe or terminal is remembered, never raised.
+        """Print one line; a closed pipe or terminal only sets `is_lost`.
 
         Args:
-            text: to be printed, broken at the width of a terminal.
-            indent: what the lines after a break begin with.
+            text: the line, wrapped at the width of a terminal.
+            indent: indent of the lines after a break.
 
         Raises:
-            OutputError: the disk is full, and nothing has to go on.
+            OutputError: the disk is full, unless `goes_on`.
         """
         self._say(text, indent)
 
@@ -97,16 +99,16 @@ class Console:
             text = wrapped(text, self.width)
         try:
             print(text, file=sys.stderr, flush=True)
-        except OSError:  # nothing is left to say it with
+        except OSError:  # no stream is left to report it
             discard(sys.stderr)
 
     @property
     def width(self) -> int:
-        """Width of the terminal [characters], 80 where there is none."""
+        """Width of the terminal [characters], 80 if there is none."""
         return shutil.get_terminal_size((80, 24)).columns
 
     def panel(self, lines: Sequence[str]) -> None:
-        """Show `lines` below everything else, in place of those before them."""
+        """Show `lines` below the output, replacing the previous panel."""
         if not self.is_live or self.is_lost:
             return
         from rich.text import Text
@@ -124,7 +126,7 @@ class Console:
             self._lose(error)
 
     def end_panel(self) -> None:
-        """Take the panel away; a second call does nothing."""
+        """Remove the panel; safe to repeat."""
         live, self._live = self._live, None
         if live is not None:
             try:
@@ -143,16 +145,16 @@ class Console:
             self._lose(error)
 
     def _lose(self, error: OSError) -> None:
-        """Drop further output; a reader that has gone is no fault, a full disk is one.
+        """Drop further output; a closed reader is no fault, a full disk is one.
 
         Raises:
-            OutputError: it is one, and nothing has to go on.
+            OutputError: the disk is full, unless `goes_on`.
         """
         self.is_lost = True
         self._live = None
         discard(sys.stdout)
         if isinstance(error, BrokenPipeError) or error.errno == errno.EIO:
-            return  # nobody reads the pipe, the terminal was closed
+            return  # closed pipe or terminal
         fault = OutputError(error)
         if not self._goes_on:
             raise fault from error
@@ -168,7 +170,7 @@ class Console:
         return live
 
     def table(self, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-        """Print a table; in bold and fitted to its width where there is a terminal."""
+        """Print a table; on a terminal in bold and fitted to its width."""
         if not self._is_terminal:
             for line in aligned([header, *rows]):
                 self.say(line)
@@ -185,7 +187,7 @@ class Console:
 
 
 class PageRecorder(Console):
-    """Keeps the graded lines of a page and prints nothing.
+    """Records the graded lines of a page and prints nothing.
 
     Attributes:
         checks: grade ("good", "warning", "bad"), name and text of every line.
@@ -196,31 +198,31 @@ class PageRecorder(Console):
         self.checks: list[dict[str, str]] = []
 
     def check(self, mark: str, name: str, text: str) -> None:
-        """Keep one line of a graded page."""
+        """Record one line of a graded page."""
         self.checks.append({"grade": _GRADES[mark], "name": name, "text": text})
 
     def table(self, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-        """Keep nothing of a table."""
+        """Discard a table."""
 
     def say(self, text: str = "", *, indent: str = "") -> None:
         """Print nothing: the page is for a program."""
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return the rows as lines with every column at its place."""
+    """Return the rows as lines with aligned columns."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
 
 
 def wrapped(text: str, width: int, indent: str = "") -> str:
-    """Return `text` broken between words at `width`; a longer word stays whole.
+    """Wrap `text` between words at `width`; a longer word stays whole.
 
-    What the arm does stays beside "ARM:".
+    The state of the arm is not separated from "ARM:".
 
     Args:
-        text: lines to be broken.
-        width: of the terminal [characters].
-        indent: what the lines after a break begin with.
+        text: lines to wrap.
+        width: width of the terminal [characters].
+        indent: indent of the lines after a break.
     """
     lines = [
         textwrap.fill(
@@ -236,7 +238,7 @@ def wrapped(text: str, width: int, indent: str = "") -> str:
 
 
 def discard(stream: TextIO) -> None:
-    """Point a stream at nothing, or Python would fail again when it flushes at exit."""
-    nothing = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nothing, stream.fileno())
-    os.close(nothing)
+    """Redirect a stream to the null device, so that Python's flush at exit succeeds."""
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, stream.fileno())
+    os.close(null)

@@ -1,4 +1,4 @@
-"""What a person with both hands on the arm hears: sounds, and words where possible."""
+"""Audible cues for an operator with both hands on the arm: bell and speech."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from experiments.settings.rig import OperatorSection
 
 
 class FeedbackSignal(Enum):
-    """A moment, with the number of sounds and the words for it."""
+    """A cue with its number of sounds and its words."""
 
     START = (1, "recording")
     TOO_FAST = (3, "slower")
@@ -40,30 +40,30 @@ class OperatorFeedback:
             self._speaker.say(words)
 
     def close(self) -> None:
-        """Be silent from here on; safe to repeat."""
+        """Stop all cues; safe to repeat."""
         if self._speaker is not None:
             self._speaker.close()
 
 
 def build_feedback(settings: OperatorSection, console: Console) -> OperatorFeedback:
-    """Return the cues as [operator] of rig.toml wants them."""
+    """Return the cues enabled in [operator] of rig.toml."""
     program = find_speech() if settings.speech else None
     speech = SpeechOutput(program) if program is not None else None
     return OperatorFeedback(console, speech, has_sound=settings.bell)
 
 
 _PROGRAMS = ("spd-say", "espeak-ng", "espeak", "say")
-_PATIENCE = 0.5  # for a program that was killed to be gone [s]
+_PATIENCE = 0.5  # time for a killed program to end [s]
 
 
 def find_speech(which: Callable[[str], str | None] = shutil.which) -> str | None:
-    """Return the path of the first speech program that is installed, None for none."""
+    """Return the path of the first installed speech program, or None."""
     return next((path for name in _PROGRAMS if (path := which(name))), None)
 
 
 @dataclass(slots=True)
 class SpeechOutput:
-    """Says words through a program of its own, one at a time.
+    """Speaks through an external program, one phrase at a time.
 
     Attributes:
         program: path of the speech program.
@@ -73,16 +73,16 @@ class SpeechOutput:
     _speaking: subprocess.Popen[bytes] | None = field(default=None)
 
     def say(self, words: str) -> None:
-        """Begin to speak `words`; speech that is still going on is cut short.
+        """Start to speak `words`, ending speech in progress.
 
-        A program that cannot be started is passed over: speech is a convenience.
+        A program that cannot be started is ignored: speech is a convenience.
         """
         self.close()
         with suppress(OSError):
             self._speaking = _start((self.program, words))
 
     def close(self) -> None:
-        """End the speech that is going on; safe to repeat."""
+        """End speech in progress; safe to repeat."""
         speaking, self._speaking = self._speaking, None
         if speaking is not None:
             speaking.kill()
@@ -91,7 +91,7 @@ class SpeechOutput:
 
 
 def _start(command: Sequence[str]) -> subprocess.Popen[bytes]:
-    """Start a program that hears no Ctrl-C of ours and has no hold on the terminal."""
+    """Start a program in its own session: no Ctrl-C, no terminal."""
     return subprocess.Popen(
         command,
         stdin=subprocess.DEVNULL,

@@ -1,4 +1,4 @@
-"""The double tap of the foot, which stands for a key while both hands are busy."""
+"""Double tap of the foot: replaces a key while both hands are busy."""
 
 from dataclasses import dataclass
 
@@ -7,25 +7,25 @@ from numpy.typing import NDArray
 
 from acquisition.ipc.loop_client import LoopClient
 
-PRESSED = 8.0  # F_n above which the foot is pressed down [N]
-RELEASED = 5.0  # and below which it is let go: it rests with less than that [N]
-SHORTEST, LONGEST = 0.02, 0.40  # a press lasts this long [s]
-WITHIN = 1.0  # from the beginning of the first press to that of the second [s]
-SLIDING = 0.05  # a foot that moves faster along the ground is pushed, not tapped [m/s]
-_SECONDS = 0.1  # of samples looked at; those seen before are passed over
+PRESSED = 8.0  # F_n above which the foot counts as pressed [N]
+RELEASED = 5.0  # F_n below which it counts as released; at rest it is less [N]
+SHORTEST, LONGEST = 0.02, 0.40  # duration of a press [s]
+WITHIN = 1.0  # longest time between the starts of both presses [s]
+SLIDING = 0.05  # v_t above which the foot is pushed, not tapped [m/s]
+_SECONDS = 0.1  # samples read per call; known ones are skipped
 
 
 @dataclass(slots=True)
 class DoubleTap:
-    """Watches F_n and v_t for two presses within a second, released between.
+    """Detects two presses of F_n within a second, with a release in between.
 
-    A push never counts: the foot slides in it, and a press that lasts longer than 0.4 s
-    is no tap. Whatever is neither begins the watch anew.
+    A push never counts: the foot slides, or the press lasts longer than 0.4 s. Either
+    resets the detector.
     """
 
     _last: float = -np.inf  # time of the newest sample [s]
     _pressed_at: float | None = None
-    _first_at: float | None = None  # beginning of a tap that waits for its second
+    _first_at: float | None = None  # start of a first tap
 
     def feed(
         self,
@@ -33,29 +33,29 @@ class DoubleTap:
         F_n: NDArray[np.float64],
         v_t: NDArray[np.float64],
     ) -> bool:
-        """Take newer samples, shapes (n,), [s, N, m/s]; return whether it was tapped.
+        """Process samples [s, N, m/s], shapes (n,); returns whether a double tap ended.
 
-        Samples that were seen before are passed over.
+        Known samples are skipped.
         """
         rows = zip(t.tolist(), F_n.tolist(), v_t.tolist(), strict=True)
         taps = [self._step(*row) for row in rows if row[0] > self._last]
         return any(taps)
 
     def forget(self) -> None:
-        """Begin anew."""
+        """Reset the detector."""
         self._pressed_at = self._first_at = None
 
     def _step(self, t: float, F_n: float, v_t: float) -> bool:
         self._last = t
-        if not abs(v_t) <= SLIDING:  # also where it is not a number
+        if not abs(v_t) <= SLIDING:  # also for NaN
             self.forget()
         elif self._pressed_at is None and F_n > PRESSED:
             self._pressed_at = t
         elif self._pressed_at is not None and F_n < RELEASED:
-            return self._let_go(self._pressed_at, t)
+            return self._on_release(self._pressed_at, t)
         return False
 
-    def _let_go(self, pressed_at: float, t: float) -> bool:
+    def _on_release(self, pressed_at: float, t: float) -> bool:
         first_at, self._pressed_at, self._first_at = self._first_at, None, None
         if not SHORTEST <= t - pressed_at <= LONGEST:
             return False
@@ -66,7 +66,7 @@ class DoubleTap:
 
 
 class FootKeys:
-    """Turns a double tap of the foot into a key, if rig.toml wants it."""
+    """Turns a double tap of the foot into a key, if enabled in rig.toml."""
 
     def __init__(self, loop_client: LoopClient, *, is_wanted: bool) -> None:
         self._taps = DoubleTap() if is_wanted else None

@@ -1,4 +1,4 @@
-"""Numbers as bars and tables of characters, and lines that fit a terminal; pure."""
+"""Bars and tables made of characters, fitted to a terminal; pure functions."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,20 +7,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 _BARS = "▁▂▃▄▅▆▇█"
-_ABSURD = 1e9  # nothing a sensor or an encoder can mean
-# What a push needs at most; what it may, stands in LimitSection of rig.toml [N].
+_ABSURD = 1e9  # limit of plausible values
+# Largest forces that a push needs [N]; the permitted ones are in LimitSection.
 PUSH_ALONG, PUSH_ACROSS = 60.0, 30.0
-_JOINT = "\u00a0"  # a space at which no line is broken
+_JOINT = "\u00a0"  # no-break space
 
 
 @dataclass(frozen=True, slots=True)
 class BarScale:
-    """What the height of a bar means, the same from trial to trial.
+    """Scale of the bars, the same for all trials.
 
     Attributes:
-        limit: where the guard steps in; the highest bar.
-        lowest, highest: the band in which a push is wanted.
-        unit: of all of them.
+        limit: limit of the guard; the highest bar.
+        lowest, highest: desired band of a push.
+        unit: unit of all values.
         form: format of a number.
     """
 
@@ -31,9 +31,9 @@ class BarScale:
     form: str
 
     def heights(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return 0..1 for magnitudes from 0 to the limit, shape kept.
+        """Heights 0..1 for magnitudes from 0 to the limit, same shape.
 
-        The square root of the share: a push at a tenth of the limit is still seen.
+        The square root keeps a push at a tenth of the limit visible.
         """
         return np.sqrt(np.clip(np.abs(values) / self.limit, 0.0, 1.0))
 
@@ -43,7 +43,7 @@ class BarScale:
         return f"{text.removeprefix('-') if float(text) == 0.0 else text} {self.unit}"
 
     def band_words(self, value: float) -> str:
-        """Return the band and on which side of it `value` is."""
+        """Return the band as text, with the side of it on which `value` is."""
         band = f"{self.lowest:g}..{self.highest:g}"
         if not np.isfinite(value):
             return f"▲ unknown, band {band}"
@@ -57,9 +57,9 @@ class LiveScales:
     """The scales of a running trial's bars, from the limits of rig.toml.
 
     Attributes:
-        used_speeds: velocities of the samples which models use, from and to [m/s].
-        foot_speed: beyond it the arm damps [m/s].
-        contact_force: beyond it the trial ends [N].
+        used_speeds: velocity range of the samples that models use [m/s].
+        foot_speed: limit beyond which the arm damps [m/s].
+        contact_force: limit beyond which the trial ends [N].
     """
 
     used_speeds: tuple[float, float]
@@ -68,17 +68,17 @@ class LiveScales:
 
     @property
     def v_t(self) -> BarScale:
-        """Of velocity; the band is that of the samples which models use."""
+        """Scale of velocity; its band is that of the samples that models use."""
         return BarScale(self.foot_speed, *self.used_speeds, "m/s", ".3f")
 
     @property
     def F_t(self) -> BarScale:
-        """Of traction."""
+        """Scale of traction."""
         return BarScale(self.contact_force, 0.0, PUSH_ALONG, "N", ".1f")
 
     @property
     def F_n(self) -> BarScale:
-        """Of normal force."""
+        """Scale of normal force."""
         return BarScale(self.contact_force, 0.0, PUSH_ACROSS, "N", ".1f")
 
 
@@ -87,8 +87,8 @@ def sparkline(
 ) -> str:
     """Return `values` as `width` bars; the last bar is the newest value.
 
-    Each bar before it is the largest magnitude of its share, so that a short slip
-    shows. A value that is none leaves its bar empty.
+    Each bar before it is the largest magnitude of its section, so that a short slip
+    shows. NaN leaves its bar empty.
     """
     data = np.asarray(values, dtype=np.float64)
     if not len(data) or width < 1:
@@ -99,9 +99,9 @@ def sparkline(
 
 
 def _peak(part: NDArray[np.float64]) -> float:
-    """Return the largest magnitude that can be one, NaN where there is none."""
-    known = np.abs(part)[np.abs(part) < _ABSURD]  # no NaN is
-    return float(known.max()) if len(known) else np.nan
+    """Largest plausible magnitude, NaN if there is none."""
+    plausible = np.abs(part)[np.abs(part) < _ABSURD]  # drops NaN
+    return float(plausible.max()) if len(plausible) else np.nan
 
 
 def bars(heights: NDArray[np.float64]) -> str:
@@ -115,12 +115,12 @@ def bars(heights: NDArray[np.float64]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class WayTrace:
-    """A quantity over the way along the container.
+    """A quantity over the travel along the container.
 
     Attributes:
-        name: of the quantity.
-        unit: of the numbers.
-        values: largest magnitude of each share of the way, NaN where no sample is.
+        name: name of the quantity.
+        unit: unit of the values.
+        values: largest magnitude in each section of the travel, NaN without a sample.
     """
 
     name: str
@@ -131,13 +131,13 @@ class WayTrace:
 def trace_lines(
     trace: WayTrace, kept: Sequence[NDArray[np.float64]], name: str, width: int
 ) -> list[str]:
-    """Return a trace in `width` columns, beside the median of the kept ones.
+    """Return a trace in `width` columns, with the median of the kept ones.
 
     Args:
-        trace: of this trial.
-        kept: values of the kept trials, of the same shares of the way.
-        name: of this trial.
-        width: of the terminal [characters].
+        trace: trace of this trial.
+        kept: values of the kept trials, in the same sections of the travel.
+        name: name of this trial.
+        width: width of the terminal [characters].
     """
     label = max(len(name), len("kept"))
     columns = max(1, width - label - 2)
@@ -145,8 +145,8 @@ def trace_lines(
     same = [values for values in kept if values.shape == trace.values.shape]
     if same:
         rows.append(_resampled(_median(np.stack(same)), columns))
-    known = np.concatenate(rows)
-    top = float(np.nanmax(known)) if np.isfinite(known).any() else 0.0
+    values = np.concatenate(rows)
+    top = float(np.nanmax(values)) if np.isfinite(values).any() else 0.0
     if top <= 0.0:
         return []
     number = f"{top:.3f}" if top < 1.0 else f"{top:.1f}"
@@ -161,13 +161,13 @@ def trace_lines(
 
 
 def _median(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the median of every column without NaN, NaN where there is nothing."""
+    """Median of every column without its NaN; NaN for an empty one."""
     columns = [column[np.isfinite(column)] for column in rows.T]
     return np.array([np.median(c) if len(c) else np.nan for c in columns])
 
 
 def _resampled(values: NDArray[np.float64], columns: int) -> NDArray[np.float64]:
-    """Return the largest value of each of `columns` shares, at most one each."""
+    """Return the largest value of each of `columns` sections; never more than given."""
     if columns >= len(values):
         return values
     return np.array([_peak(part) for part in np.array_split(values, columns)])
@@ -175,14 +175,14 @@ def _resampled(values: NDArray[np.float64], columns: int) -> NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class KeptRow:
-    """A kept trial in the running table; None = not known.
+    """A kept trial in the running table; None = unknown.
 
     Attributes:
-        trial: its name.
-        v_t: median of the velocity while it moves [m/s].
+        trial: name of the trial.
+        v_t: median velocity while moving [m/s].
         ratio: slope of F_t over F_n.
-        slips: how many there were.
-        remark: the newest note on it; empty for none.
+        slips: number of slips.
+        remark: newest note on it; empty for none.
     """
 
     trial: str
@@ -213,10 +213,10 @@ def _shortened(text: str, most: int) -> str:
 
 
 def packed(text: str, width: int) -> str:
-    """Return `text` in lines of `width`, broken only between its parts if possible.
+    """Wrap `text` at `width`, between its parts if possible.
 
-    Parts stand two spaces or " · " apart, as keys do: "[space] record" is one of
-    them. A part that is longer than a line is broken between words.
+    Parts are separated by two spaces or " · ", as keys are: "[space] record" is one
+    part. A part longer than a line is broken between words.
     """
     import textwrap
 
@@ -236,11 +236,11 @@ def _parts(text: str) -> list[str]:
 
 
 def fitted(lines: Sequence[str], width: int, height: int) -> list[str]:
-    """Return the lines of a panel inside a terminal of `width` times `height`.
+    """Fit the lines of a panel into a terminal of `width` x `height` characters.
 
-    Nothing is cut: lines are broken between their parts. Where there is no room for
-    all, those in the middle give way: the first says what the arm does, the last two
-    which keys there are.
+    Lines are wrapped between their parts, never cut. Without room for all, lines in
+    the middle are dropped: the first shows the state of the arm, the last two the
+    keys.
     """
     broken = [
         packed(line, width).split("\n") if len(line) > width else [line]

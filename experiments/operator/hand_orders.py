@@ -1,4 +1,4 @@
-"""Lines that tell the hands at a served arm what to do, e.g. pose, hang, push."""
+"""Orders to the hands at a served arm, one per line, e.g. pose, hang, push."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Literal
 
 from acquisition.simulation import Hands
 
-_HARDEST = 4.0  # N m, of a hand that twists
+_HARDEST = 4.0  # N m, largest torque of a twisting hand
 _LONGEST, _HEAVIEST, _STRONGEST, _FARTHEST = 600.0, 20.0, 200.0, 7.0  # s, kg, N, rad
 
 
@@ -27,7 +27,7 @@ class PoseOrder:
 
 @dataclass(frozen=True, slots=True)
 class StopOrder:
-    """Turn `joint`, 1-7, until its stop on a side bears."""
+    """Turn `joint`, 1-7, onto its stop on one side."""
 
     joint: int
     side: Literal["low", "high"]
@@ -85,14 +85,14 @@ HandOrder = PoseOrder | StopOrder | HangOrder | PushOrder | TwistOrder | Release
 
 
 class HandOrderError(ValueError):
-    """A line that begins like an order to the hands, and is none; in words why."""
+    """A malformed order to the hands; its text says why."""
 
 
 def parse_hand_order(words: list[str]) -> HandOrder | None:
-    """Return what a line orders, None if its first word is none of the hands'.
+    """Parse an order; None if its first word is no order to the hands.
 
     Raises:
-        HandOrderError: something is missing, too much, or beyond what a person does.
+        HandOrderError: an argument is missing, superfluous or out of range.
     """
     reader = _READERS.get(words[0].lower()) if words else None
     return None if reader is None else reader(words[1:])
@@ -111,7 +111,7 @@ def _stop(words: list[str]) -> HandOrder:
     if len(words) != 2 or words[0] not in ["1", "2", "3", "4", "5", "6", "7"]:
         raise HandOrderError(f"- expected {usage}, a joint 1..7")
     side = words[1].lower()
-    if side == "low" or side == "high":  # noqa: PLR1714 - one by one, for their types
+    if side == "low" or side == "high":  # noqa: PLR1714 - narrows the type
         return StopOrder(int(words[0]), side)
     raise HandOrderError(f"- expected {usage}")
 
@@ -129,7 +129,7 @@ def _unhang(words: list[str]) -> HandOrder:
 def _push(words: list[str]) -> HandOrder:
     *force, seconds = _numbers(words, 4, "push FX FY FZ SECONDS")
     return PushOrder(
-        tuple(_within(each, -_STRONGEST, _STRONGEST, "N") for each in force),
+        tuple(_within(axis, -_STRONGEST, _STRONGEST, "N") for axis in force),
         _within(seconds, 0.0, _LONGEST, "s"),
     )
 

@@ -1,4 +1,4 @@
-"""The one table of the operator's keys: what each does, on screen and in a script."""
+"""The table of the operator's keys: action, text on the screen, word in a script."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -16,7 +16,7 @@ REJECT_REASONS = {
 
 
 class KeyAction(Enum):
-    """What a key does."""
+    """Action of a key."""
 
     CONFIRM = "confirm"
     RECORD = "record"
@@ -35,7 +35,7 @@ class KeyAction(Enum):
 
 
 class Operand(Enum):
-    """What follows the word of a key in a script."""
+    """Argument after the word of a key in a script."""
 
     NOTHING = ""
     TEXT = " TEXT"
@@ -47,12 +47,12 @@ class OperatorKey:
     """A key at one prompt.
 
     Attributes:
-        key: as it arrives from the keyboard.
-        action: what it does.
-        help: what it does, in the words of docs/sessions.md.
-        screen: as the screen shows it; empty = not shown.
-        word: of a line in an operator script; empty = none.
-        operand: what follows the word.
+        key: character from the keyboard.
+        action: its action.
+        help: description in docs/sessions.md.
+        screen: text on the screen; empty = not shown.
+        word: word in an operator script; empty = none.
+        operand: argument after the word.
     """
 
     key: str
@@ -70,7 +70,7 @@ class OperatorKey:
         return label + reasons if self.operand is Operand.REASON else label
 
 
-MOST_STEPS = 9  # of a reset, each ticked by its digit
+MOST_STEPS = 9  # steps of a reset, each ticked by its digit
 _CONFIRM = OperatorKey(" ", KeyAction.CONFIRM)
 _QUIT = OperatorKey("q", KeyAction.QUIT, "quit")
 _UNDO = OperatorKey("u", KeyAction.UNDO, "take the newest verdict back, for 10 s")
@@ -93,8 +93,8 @@ KEYS: Mapping[Prompt, tuple[OperatorKey, ...]] = {
         _QUIT,
     ),
     Prompt.CONFIRM: (_CONFIRM, _QUIT),
-    # Before a motion of the arm, and before it sinks, no key that was pressed before:
-    # a pedal that sticks, or a key that is held, answers neither.
+    # Another key than at the other prompts: a stuck pedal or a held key must not
+    # confirm a motion of the arm or let it sink.
     Prompt.MOVE: (OperatorKey("g", KeyAction.CONFIRM, "once it is clear: go"), _QUIT),
     Prompt.MOVING: (_QUIT,),
     Prompt.TOUCH: (_CONFIRM, OperatorKey("d", KeyAction.FINISH), _QUIT),
@@ -148,8 +148,7 @@ KEYS: Mapping[Prompt, tuple[OperatorKey, ...]] = {
         OperatorKey("q", KeyAction.QUIT, "quit", word="quit"),
     ),
 }
-# How a session goes on after a fault, by what is asked for then; None: it has ended,
-# and a command goes on.
+# How to go on after a fault, by prompt; None: the session has ended.
 AFTER_FAULT: Mapping[Prompt | None, str] = {
     None: "run: {command}",
     Prompt.READY: "lift the foot for the tare; [space] records again",
@@ -159,7 +158,7 @@ AFTER_FAULT: Mapping[Prompt | None, str] = {
 NOTE_KEYS = "Type the note: Enter ends it, Esc cancels it."
 STOP_KEYS = "Ctrl-C finish safely, twice = stop now"
 
-# Prompts whose keys docs/sessions.md explains, with its words for them.
+# Prompts whose keys docs/sessions.md explains, with their descriptions there.
 _EXPLAINED = {
     Prompt.SUPPORT: "the arm is to be activated",
     Prompt.DAMPED: "the arm was too fast, and is damped",
@@ -172,11 +171,11 @@ _EXPLAINED = {
 
 
 def key_action(prompt: Prompt, key: str) -> KeyAction | None:
-    """Return what `key` does at `prompt`, None for nothing.
+    """Return the action of `key` at `prompt`, or None.
 
     Args:
-        prompt: what is asked for.
-        key: as an `OperatorInput` returns it; with the digit of its reason for REDO.
+        prompt: the prompt.
+        key: key from an `OperatorInput`; for REDO with the digit of its reason.
     """
     for entry in KEYS.get(prompt, ()):
         if entry.operand is Operand.REASON:

@@ -1,4 +1,4 @@
-"""Pendant and hands of a served arm: lines of a script and of stdin that use them."""
+"""Orders to pendant and hands of a served arm, from a script and from stdin."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from experiments.operator.hand_orders import (
 
 Press = Literal["activate", "idle", "estop", "quit"]
 PRESSES: tuple[Press, ...] = ("activate", "idle", "estop", "quit")
-_LONGEST_LINE = 256  # bytes; what is longer is no button
+_LONGEST_LINE = 256  # bytes
 _LATEST_S = 1e6
 Order = Press | HandOrder
 ORDERS = (*PRESSES, *HAND_WORDS)
 
 
 class Pressable(Protocol):
-    """A pendant's other end, and the hands at the arm."""
+    """Receiver of button presses, with the hands at the arm."""
 
     @property
     def hands(self) -> Hands | None:
-        """The person at the arm; None = there can be none."""
+        """The simulated person at the arm; None if not available."""
         ...
 
     def press(self, action: PendantAction) -> None:
@@ -43,18 +43,18 @@ class Pressable(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class TimedPress:
-    """A button or an order, and when it comes [ns after the start]."""
+    """A button or an order, with its time [ns after the start]."""
 
     after_ns: int
     press: Order
 
 
 class OrderError(ValueError):
-    """A line that is no order; in words why."""
+    """A line that is no order; its text says why."""
 
 
 def parse_order(words: list[str]) -> Order:
-    """Return the button or the order to the hands that the words of a line are.
+    """Parse the words of a line as a button or an order to the hands.
 
     Raises:
         OrderError: they are neither.
@@ -72,10 +72,10 @@ def parse_order(words: list[str]) -> Order:
 
 
 def read_script(path: Path) -> tuple[TimedPress, ...]:
-    """Return the presses of the script at `path`.
+    """Read the script at `path`.
 
     Raises:
-        SettingsError: it cannot be read, or as `parse_script`.
+        SettingsError: `path` cannot be read, or as `parse_script`.
     """
     try:
         text = read_text(path)
@@ -88,14 +88,14 @@ def read_script(path: Path) -> tuple[TimedPress, ...]:
 
 
 def parse_script(text: str) -> tuple[TimedPress, ...]:
-    """Return the presses of a script, in the order in which they come.
+    """Parse a script into timed orders, in their sequence.
 
-    A line is a button or an order to the hands, after a time [s after the start] or
-    without; without one it follows the line before it at once. Empty lines and those
-    with # are skipped.
+    A line is an optional time [s after the start] and a button or an order to the
+    hands. Without a time it follows the previous line at once. Empty lines and
+    comments with # are skipped.
 
     Raises:
-        SettingsError: a line is neither, or its time lies before the line above.
+        SettingsError: a line is malformed, or earlier than the previous one.
     """
     presses: list[TimedPress] = []
     after_ns = 0
@@ -117,7 +117,7 @@ def parse_script(text: str) -> tuple[TimedPress, ...]:
 
 
 def _parse_timed(words: list[str], after_ns: int) -> TimedPress:
-    """Return what a line orders, not before `after_ns`; raise OrderError."""
+    """Parse a line whose time is at least `after_ns`; raises OrderError."""
     seconds = _number(words[0])
     if seconds is None:
         return TimedPress(after_ns, parse_order(words))
@@ -132,7 +132,7 @@ def _parse_timed(words: list[str], after_ns: int) -> TimedPress:
 
 
 def _number(text: str) -> float | None:
-    """Return the number that `text` is, None if it is none."""
+    """Parse a number; None if it is none."""
     try:
         return float(text)
     except ValueError:
@@ -140,22 +140,22 @@ def _number(text: str) -> float | None:
 
 
 class Lines:
-    """Splits what comes from a descriptor into lines, without waiting.
+    """Reads lines from a descriptor without blocking.
 
     Attributes:
-        is_ended: the other side has closed it.
-        is_terminal: a person is on the other side.
+        is_ended: whether the other side has closed it.
+        is_terminal: whether the descriptor is a terminal.
     """
 
     def __init__(self, descriptor: int | None) -> None:
-        """Read from `descriptor`; None is one that never says anything."""
+        """Read from `descriptor`; None = no input."""
         self.is_ended = False
         self.is_terminal = descriptor is not None and os.isatty(descriptor)
         self._descriptor = descriptor
         self._rest = b""
 
     def take(self) -> list[str]:
-        """Return the whole lines that have arrived since the last call."""
+        """Return the complete lines received since the last call."""
         if self._descriptor is None or self.is_ended or self._is_in_background():
             return []
         if not select.select([self._descriptor], [], [], 0)[0]:
@@ -167,20 +167,20 @@ class Lines:
         return [line.decode(errors="replace") for line in lines if line.strip()]
 
     def _is_in_background(self) -> bool:
-        """Return whether another program has the terminal: reading would stop us."""
+        """Return whether another program has the terminal: a read would stop us."""
         if self._descriptor is None or not self.is_terminal:
             return False
         try:
             return os.tcgetpgrp(self._descriptor) != os.getpgrp()
-        except OSError:  # a terminal that controls nobody
+        except OSError:  # not a controlling terminal
             return False
 
 
 class Pendant:
-    """Presses buttons and orders the hands as a script and a person on stdin say.
+    """Merges the orders of a script with those of a person on stdin.
 
-    Ctrl-D on a terminal quits, unless there is a script. The end of a pipe or a file
-    does not: a service has no stdin, and goes on until a signal ends it.
+    Ctrl-D on a terminal quits, unless there is a script. The end of a pipe or file does
+    not: a service has no stdin and runs until a signal ends it.
     """
 
     def __init__(
@@ -193,7 +193,7 @@ class Pendant:
         self._unknown: list[str] = []
 
     def due(self, now_ns: int) -> list[Order]:
-        """Return what is pressed or ordered by `now_ns`, oldest first."""
+        """Return the orders due by `now_ns`, oldest first."""
         pressed: list[Order] = []
         while self._script and self._script[0].after_ns <= now_ns - self._start_ns:
             pressed.append(self._script.pop(0).press)
@@ -202,12 +202,12 @@ class Pendant:
                 pressed.append(parse_order(line.split()))
             except OrderError as error:
                 self._unknown.append(f"{line.strip()[:60]!r} {error}")
-        is_left = self._lines.is_ended and self._lines.is_terminal
-        if is_left and not self._has_script:
+        is_closed = self._lines.is_ended and self._lines.is_terminal
+        if is_closed and not self._has_script:
             pressed.append("quit")
         return pressed
 
     def take_unknown(self) -> list[str]:
-        """Return the lines since the last call that are no order, and why."""
+        """Return the invalid lines since the last call, with reasons."""
         unknown, self._unknown = self._unknown, []
         return unknown

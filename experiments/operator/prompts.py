@@ -1,4 +1,4 @@
-"""What the operator is asked for, and the interface of whoever answers."""
+"""Prompts to the operator, and the interface that answers them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Protocol
 
 
 class Prompt(Enum):
-    """What the person is asked for."""
+    """Prompt to the operator."""
 
     CHOICE = "choice"
     SUPPORT = "support"
@@ -30,14 +30,14 @@ class Prompt(Enum):
 
 @dataclass(frozen=True, slots=True)
 class PromptState:
-    """A prompt with what it is about.
+    """A prompt with its context.
 
     Attributes:
-        prompt: what is asked for.
+        prompt: the prompt.
         trial: number of the trial.
-        attempt: which attempt at it, from 1.
-        is_complete: REVIEW only: the trial ended by itself.
-        since: how long it has been asked [s].
+        attempt: number of the attempt, from 1.
+        is_complete: REVIEW only: whether the trial is complete.
+        since: time since the prompt appeared [s].
     """
 
     prompt: Prompt
@@ -52,12 +52,12 @@ class OperatorInput(Protocol):
 
     @property
     def draft(self) -> str:
-        """What has been typed of a line so far."""
+        """Text typed of the current line."""
         ...
 
     @property
     def who(self) -> str:
-        """Who presses the keys, in the records of a session without --operator."""
+        """Name of the operator in the records of a session without --operator."""
         ...
 
     def answer(self, state: PromptState) -> str:
@@ -65,5 +65,5 @@ class OperatorInput(Protocol):
         ...
 
     def line(self, state: PromptState) -> str | None:
-        """Return the line that was typed, "" where it was given up, None before."""
+        """Return the line once typed, "" if cancelled, None before."""
         ...

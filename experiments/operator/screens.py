@@ -1,4 +1,4 @@
-"""What the live part of the screen shows, as lines of text; pure."""
+"""Screens as lines of text; pure functions."""
 
 from dataclasses import dataclass
 from math import ceil
@@ -17,24 +17,24 @@ from experiments.operator.keys import STOP_KEYS, screen_keys
 from experiments.operator.prompts import Prompt
 
 _WIDEST = 60  # characters of a sparkline
-_TABLE_ROWS = 10  # of the running table
+_TABLE_ROWS = 10  # rows of the running table
 
 
 @dataclass(frozen=True, slots=True)
 class RecordingView:
-    """A running trial.
+    """Content of the screen of a running trial.
 
     Attributes:
-        trial: its name.
-        seconds: since the start [s].
-        displacement: of the foot along the container [m].
+        trial: name of the trial.
+        seconds: time since the start [s].
+        displacement: displacement of the foot along the container [m].
         travel: length of the container [m].
-        rate: cycles per second of the last second [Hz].
-        missed: cycles that were missed in this trial.
-        is_arm_fine: every motor answered in the last cycle.
-        is_sensor_fine: the last force sample was fresh and within its range.
+        rate: cycle rate over the last second [Hz].
+        missed: missed cycles of this trial.
+        is_arm_fine: whether every motor answered in the last cycle.
+        is_sensor_fine: whether the last force sample was fresh and in range.
         traction: v_t, F_t, F_n of the last seconds [m/s, N, N], shape (n, 3).
-        scales: of the bars.
+        scales: scales of the bars.
     """
 
     trial: str
@@ -91,13 +91,13 @@ def live_line(
     traction: tuple[float, float, float],
     late: int,
 ) -> str:
-    """Return a running trial in one line, for where nothing can be drawn.
+    """Return a running trial in one line, for output without a panel.
 
     Args:
-        trial: its name.
+        trial: name of the trial.
         where: time since the start [s], displacement and travel [m].
         traction: v_t, F_t, F_n [m/s, N, N].
-        late: cycles that were late.
+        late: number of late cycles.
     """
     seconds, displacement, travel = where
     v_t, F_t, F_n = traction
@@ -109,23 +109,23 @@ def live_line(
 
 @dataclass(frozen=True, slots=True)
 class ReadyView:
-    """Between two trials.
+    """Content of the screen between two trials.
 
     Attributes:
-        session: its id.
-        terrain: its terrain.
+        session: id of the session.
+        terrain: name of the terrain.
         trial: number of the next trial.
-        wanted: how many are to be kept.
-        kept: how many are.
-        rejected: how many were not.
-        elapsed: since the session was opened [s].
-        left: how long the missing ones will take [s]; None = not known yet.
-        reset: what is to be done to the terrain before each trial.
+        wanted: number of trials to keep.
+        kept: number of kept trials.
+        rejected: number of rejected attempts.
+        elapsed: time since the session was opened [s].
+        left: expected time for the missing trials [s]; None = unknown yet.
+        reset: steps that restore the terrain before each trial.
         ticked: numbers of the steps of `reset` that are done, from 1.
-        thin: cell of speed and load that the kept trials leave thin; empty for none.
+        thin: cell of speed and load with the fewest samples; empty for none.
         table: the kept trials, oldest first.
-        given: the newest verdict while it can be taken back; empty afterwards.
-        undo_left: how long that is [s].
+        given: newest verdict while it can be undone; empty afterwards.
+        undo_left: remaining time to undo it [s].
     """
 
     session: str
@@ -166,17 +166,17 @@ def ready_lines(view: ReadyView, width: int = 80) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class EndView:
-    """A session that has nothing left to record.
+    """Content of the page at the end of a session.
 
     Attributes:
-        session: its id.
-        terrain: its terrain.
-        kept: how many trials are kept.
-        wanted: how many are to be.
-        rejected: how many were not.
-        elapsed: how long this opening took [s].
-        estimate: how long it looked like taking after its first kept trial [s].
-        drift: of the force between first and last tare [N]; empty = not known.
+        session: id of the session.
+        terrain: name of the terrain.
+        kept: number of kept trials.
+        wanted: number of trials to keep.
+        rejected: number of rejected attempts.
+        elapsed: duration of this opening [s].
+        estimate: duration as estimated after the first kept trial [s].
+        drift: drift of the force between first and last tare [N]; empty = unknown.
     """
 
     session: str
@@ -213,5 +213,5 @@ def _fine(is_fine: bool) -> str:
 
 
 def _clock(seconds: float) -> str:
-    minutes, rest = divmod(int(seconds), 60)
-    return f"{minutes}:{rest:02d}"
+    minutes, whole_seconds = divmod(int(seconds), 60)
+    return f"{minutes}:{whole_seconds:02d}"

@@ -1,4 +1,4 @@
-"""Who answers the prompts: a person at the keyboard, a script, or nobody (auto)."""
+"""Choice of the operator: a person at the keyboard, a script, or automatic."""
 
 import sys
 from pathlib import Path
@@ -13,11 +13,11 @@ from experiments.operator.terminal import TerminalInput
 
 _PROMPTS = (Prompt.LIFT, Prompt.READY, Prompt.REVIEW)
 _WORDS = {word: key for prompt in _PROMPTS for word, key in script_keys(prompt).items()}
-NO_PERSONS = frozenset({AutoOperator.who, "script"})  # that answer prompts
+NO_PERSONS = frozenset({AutoOperator.who, "script"})  # automatic operators
 
 
 def choose_operator(script: str | None, *, is_fake: bool) -> OperatorInput:
-    """Return who answers: a script, `auto`, or the keyboard.
+    """Return the operator: a script, `auto`, or the keyboard.
 
     Raises:
         SettingsError: a real session without a terminal, or a bad script.
@@ -35,15 +35,15 @@ def choose_operator(script: str | None, *, is_fake: bool) -> OperatorInput:
 
 
 class ScriptedOperator:
-    """Presses keys line by line, each at its own prompt; the rest like `AutoOperator`.
+    """Presses the keys of a script, each at its prompt; otherwise as `AutoOperator`.
 
     At a review: `keep`, `redo REASON` (1-5), `remark TEXT` (a note on the trial),
-    `quit`. Between trials, before the next one begins: `pause`, `note TEXT`, `view`,
-    `last` (quit after the next trial), `undo` (take the verdict before it back). `#`
-    begins a comment. After the last line everything that is complete is kept.
+    `quit`. Between trials: `pause`, `note TEXT`, `view`, `last` (quit after the next
+    trial), `undo` (of the previous verdict). `#` begins a comment. After the last line
+    every complete trial is kept.
 
     Raises:
-        SettingsError: the file cannot be read or a line is none of these.
+        SettingsError: the file cannot be read, or a line is invalid.
     """
 
     draft = ""
@@ -57,20 +57,20 @@ class ScriptedOperator:
         self._text = ""
 
     def answer(self, state: PromptState) -> str:
-        """Return the key of the next line where this is its prompt."""
+        """Return the key of the next line if this is its prompt."""
         keys = script_keys(state.prompt)
-        word, rest = self._lines[0] if self._lines else ("", "")
+        word, argument = self._lines[0] if self._lines else ("", "")
         if word not in keys:
             return self._auto.answer(state)
         if state.prompt is Prompt.READY and state.since <= READY_SECONDS:
             return ""
         self._lines.pop(0)
-        self._text = rest
+        self._text = argument
         entry = keys[word]
-        return entry.key + (rest if entry.operand is Operand.REASON else "")
+        return entry.key + (argument if entry.operand is Operand.REASON else "")
 
     def line(self, state: PromptState) -> str | None:
-        """Return the text of the line that asked for the note."""
+        """Return the text of the note in the script."""
         del state
         return self._text
 
@@ -87,9 +87,9 @@ def _read(path: Path) -> str:
 
 
 def _parse(path: Path, number: int, words: list[str]) -> tuple[str, str]:
-    word, rest = words[0], " ".join(words[1:])
-    if word in _WORDS and _is_operand(_WORDS[word].operand, rest):
-        return word, rest
+    word, argument = words[0], " ".join(words[1:])
+    if word in _WORDS and _is_operand(_WORDS[word].operand, argument):
+        return word, argument
     raise SettingsError(
         f"{path}, line {number}: {' '.join(words)!r} - expected keep, redo 1..5 or "
         "quit; remark TEXT; or between trials pause, note TEXT, view, last or undo.",

@@ -1,4 +1,4 @@
-"""Single keys from a terminal, which is given back as it was whatever happens."""
+"""Single keys from a terminal, whose settings are always restored."""
 
 import atexit
 import codecs
@@ -21,17 +21,17 @@ from experiments.operator.keys import (
 )
 from experiments.operator.prompts import OperatorInput, Prompt, PromptState
 
-_RELEASED_NS = 750_000_000  # without a key that would repeat if it were held
-_POLL_NS = 50_000_000  # between two looks at the keyboard while no loop runs
-_AT_ONCE = 256  # bytes
+_RELEASED_NS = 750_000_000  # longest time between repeats of a held key
+_POLL_NS = 50_000_000  # polling period of the keyboard while no loop runs
+_AT_ONCE = 256  # bytes per read
 LONGEST_LINE = 500  # characters of a note
 _ESCAPE, _BACKSPACE = "\x1b", "\x7f\x08"
 
 
 class Cbreak:
-    """A terminal without line editing and echo while this lasts.
+    """Context manager: a terminal without line editing and echo.
 
-    Leaving it twice, or through an exit handler, restores the same settings once.
+    Leaving it twice, or through an exit handler, restores the settings once.
     """
 
     def __init__(self, descriptor: int) -> None:
@@ -39,7 +39,7 @@ class Cbreak:
         self._before: list[int | list[bytes | int]] | None = None
 
     def __enter__(self) -> Self:
-        """Switch the terminal over; one that has gone is left alone."""
+        """Switch the terminal over; a closed one is ignored."""
         with contextlib.suppress(termios.error):
             self._before = termios.tcgetattr(self._descriptor)
             tty.setcbreak(self._descriptor, termios.TCSADRAIN)
@@ -52,12 +52,12 @@ class Cbreak:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Give the terminal back."""
+        """Restore the terminal."""
         del kind, error, trace
         self.restore()
 
     def restore(self) -> None:
-        """Give the terminal back as it was; a second call does nothing."""
+        """Restore the terminal's settings; safe to repeat."""
         before, self._before = self._before, None
         if before is not None:
             atexit.unregister(self.restore)
@@ -66,19 +66,19 @@ class Cbreak:
 
 
 def keyboard(operator: OperatorInput) -> contextlib.AbstractContextManager[object]:
-    """Return what switches the terminal over while `operator` types there."""
+    """Context manager that switches the terminal over if `operator` types there."""
     if isinstance(operator, TerminalInput):
         return Cbreak(operator.descriptor)
     return contextlib.nullcontext()
 
 
 def is_person(operator: OperatorInput) -> bool:
-    """Return whether `operator` types at a terminal, and may take any time."""
+    """Return whether `operator` is a person at a terminal."""
     return isinstance(operator, TerminalInput)
 
 
 def login_name() -> str:
-    """Return the name of the person who is logged in."""
+    """Return the login name."""
     try:
         return pwd.getpwuid(os.getuid()).pw_name
     except KeyError:
@@ -86,7 +86,7 @@ def login_name() -> str:
 
 
 def wait_for_key(operator: OperatorInput, prompt: Prompt) -> KeyAction:
-    """Wait for a key of `prompt` while no loop runs; return what it does."""
+    """Wait for a key of `prompt` while no loop runs; returns its action."""
     clock = SystemClock()
     state = PromptState(prompt, 0, 0, is_complete=False, since=0.0)
     with keyboard(operator):
@@ -96,11 +96,11 @@ def wait_for_key(operator: OperatorInput, prompt: Prompt) -> KeyAction:
 
 
 class HeldKeys:
-    """Tells a key that is pressed from one that repeats: held, or a pedal that sticks.
+    """Distinguishes a pressed key from repeats of a held key or a stuck pedal.
 
-    A terminal does not tell when a key is released. One that is held comes again after
-    at most 0.7 s and then at least ten times a second. So each key counts once it has
-    been silent for longer, whatever other keys come between.
+    A terminal does not report releases. A held key repeats after at most 0.7 s and then
+    at least ten times a second. So a key counts as pressed after a longer silence,
+    whatever other keys come in between.
     """
 
     def __init__(self, now_ns: Callable[[], int]) -> None:
@@ -108,7 +108,7 @@ class HeldKeys:
         self._last_ns: dict[str, int] = {}  # by key
 
     def is_pressed(self, key: str) -> bool:
-        """Return whether a key that has just come is pressed anew."""
+        """Return whether a key just received is newly pressed."""
         now_ns = self._now_ns()
         last_ns = self._last_ns.get(key)
         self._last_ns[key] = now_ns
@@ -116,14 +116,13 @@ class HeldKeys:
 
 
 class TerminalInput:
-    """Keys as they are pressed, from a keyboard or anything that looks like one.
+    """Keys from a keyboard or a pedal that acts as one.
 
-    A pedal that types a space or a letter is a keyboard too. `r` waits for the digit
-    of the reason; any other key takes the `r` back.
+    `r` waits for the digit of the reason; any other key cancels it.
 
     Attributes:
-        descriptor: of the terminal.
-        draft: what has been typed of a line so far.
+        descriptor: descriptor of the terminal.
+        draft: text typed of the current line.
     """
 
     def __init__(
@@ -131,7 +130,7 @@ class TerminalInput:
     ) -> None:
         self.descriptor = descriptor
         self.draft = ""
-        self._waiting: list[tuple[str, bool]] = []  # (key, it was pressed anew)
+        self._waiting: list[tuple[str, bool]] = []  # (key, newly pressed)
         self._held = HeldKeys(now_ns or SystemClock().now_ns)
         self._decoder = codecs.getincrementaldecoder("utf-8")("ignore")
         self._is_end = False
@@ -140,28 +139,27 @@ class TerminalInput:
 
     @property
     def who(self) -> str:
-        """The person who is logged in."""
+        """The login name."""
         return login_name()
 
     def answer(self, state: PromptState) -> str:
-        """Return the next key that was pressed, "" for none, q when all have gone.
+        """Return the next key pressed, "" for none, q after the end of the input.
 
-        What was typed before the prompt came was not meant for it and is forgotten. A
-        key that only repeats, because it is held, answers nothing.
+        Keys typed before the prompt appeared are dropped; repeats of a held key answer
+        nothing.
         """
         self._receive(state.prompt)
         while self._waiting:
-            is_anew = self._waiting[0][1]
+            is_new = self._waiting[0][1]
             key = self._next().lower()
-            if is_anew and (pressed := self._take(key, state.prompt)):
+            if is_new and (pressed := self._take(key, state.prompt)):
                 return pressed
         return "q" if self._is_end else ""
 
     def line(self, state: PromptState) -> str | None:
         """Return the line when Enter ends it, "" when Esc cancels it, None before.
 
-        Backspace takes a character back. An arrow key, which begins like Esc, does
-        nothing.
+        Backspace deletes a character. Arrow keys, which begin with Esc, are ignored.
         """
         self._receive(state.prompt)
         while self._waiting:
@@ -179,7 +177,7 @@ class TerminalInput:
         return "" if self._is_end else None
 
     def _receive(self, prompt: Prompt) -> None:
-        """Read what is there; what came before `prompt` is forgotten."""
+        """Read the pending keys; drops those typed before `prompt`."""
         self._read()
         if prompt is not self._prompt:
             self._prompt = prompt
@@ -191,7 +189,7 @@ class TerminalInput:
         return self._waiting.pop(0)[0]
 
     def _skip_sequence(self) -> bool:
-        """Pass over the rest of an arrow or function key; return whether it was one."""
+        """Skip the rest of an arrow or function key; returns whether it was one."""
         if not self._waiting or self._waiting[0][0] not in ("[", "O"):
             return False
         self._next()

@@ -1,7 +1,7 @@
-"""Are rig and computer fit to run, and is it still the rig the session began on.
+"""Preflight: checks of rig and computer before a session.
 
 `preflight` runs the graded checks, `host_checks` has those of the computer, `page`
-takes their lines; `conditions` compares settings with those of the unfinished session.
-`host_setup` is what the computer needs, `loop_benchmark` what its loop achieves. Begin
+collects their lines; `conditions` compares settings with those of an unfinished
+session. `host_setup` writes system files, `loop_benchmark` measures the loop. Begin
 with `preflight`.
 """

@@ -1,4 +1,4 @@
-"""The conditions a session was recorded under, compared with those of now."""
+"""Comparison of the present conditions with those of a session."""
 
 import hashlib
 from collections.abc import Iterable, Mapping
@@ -27,7 +27,7 @@ FOOT = "terrain.foot"  # name of a condition
 _GRAVITY, _FRICTION = "gravity calibration", "friction calibration"
 _NO_CALIBRATION = "none"
 _SENSOR = ("model", "serial_number", "firmware", "filter")
-# Settings that no recorded number depends on.
+# Settings that do not affect recorded numbers.
 _EXEMPT = (
     "rig.can.",
     "rig.loop.",
@@ -45,7 +45,7 @@ _SHOWN = 8  # differences that are listed
 
 
 def rig_conditions(rig: Rig) -> dict[str, str]:
-    """Return settings as calibrated, foot, terrain and gravity model by name."""
+    """Return settings, terrain row and digests of the calibrations by name."""
     values = _texts(
         {
             "rig": rig.settings.rig.model_dump(mode="json"),
@@ -62,7 +62,7 @@ def _digest(text: str) -> str:
 
 
 def sensor_conditions(devices: Mapping[str, str]) -> dict[str, str]:
-    """Return which sensor it is, from what the preflight read."""
+    """Return the identity of the sensor from the metadata of the preflight."""
     return {
         f"sensor {key}": devices[f"ft_sensor:{key}"]
         for key in _SENSOR
@@ -73,13 +73,13 @@ def sensor_conditions(devices: Mapping[str, str]) -> dict[str, str]:
 def default_conditions(
     sensor_kind: str = "", feet: Iterable[str] = ()
 ) -> dict[str, str]:
-    """Return the conditions of settings that are left out, by name.
+    """Return the default conditions by name.
 
-    A setting that a session does not state had this value then.
+    A setting that a session does not state had its default value.
 
     Args:
-        sensor_kind: `ft_sensor.kind`, whose section has the sensor's defaults.
-        feet: names of the feet, each of which has a section.
+        sensor_kind: `ft_sensor.kind`, which selects the section of the sensor.
+        feet: names of the feet.
     """
     rig = _defaults(RigSettings)
     if sensor_kind in SECTIONS:
@@ -91,10 +91,10 @@ def default_conditions(
 
 
 def differences(then: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
-    """Return in words which conditions of `now` are not as they were.
+    """Describe the conditions of `now` that differ from `then`.
 
-    A condition that was not written then had its default value. One that is not known
-    any more is left out: no setting can bring it back.
+    A condition missing in `then` had its default value. One missing in `now` is
+    ignored: no setting can restore it.
     """
     feet = {n.split(".")[2] for n in now if n.startswith("rig.feet.")}
     kind = now.get("rig.ft_sensor.kind", "")
@@ -109,10 +109,10 @@ def differences(then: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
 def check_conditions(
     folder: SessionFolder, now: Mapping[str, str], console: Console, *, is_forced: bool
 ) -> list[str]:
-    """Compare `now` with the conditions of the session; return what differs.
+    """Compare `now` with the conditions of the session; returns the differences.
 
     Raises:
-        SessionError: something differs and it is not forced.
+        SessionError: conditions differ, unless forced.
     """
     changed = differences(read_conditions(folder), now)
     for text in changed[:_SHOWN]:
@@ -132,7 +132,7 @@ def check_conditions(
 
 
 def _texts(tables: Mapping[str, object]) -> dict[str, str]:
-    """Return the values of tables as text by dotted name, without exempt ones."""
+    """Return the values of tables as text by dotted name, without exempt names."""
     return {
         name: str(value)
         for name, value in flatten(tables).items()
@@ -155,11 +155,11 @@ def _defaults(model: type[BaseModel]) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class MountedFoot:
-    """The foot of the session that was open last.
+    """The foot of the last open session.
 
     Attributes:
-        folder: of the session.
-        foot: its name in rig.toml.
+        folder: folder of the session.
+        foot: name of the foot in rig.toml.
     """
 
     folder: SessionFolder
@@ -167,11 +167,11 @@ class MountedFoot:
 
 
 def last_foot(data: Path, *, is_simulated: bool) -> MountedFoot | None:
-    """Return the foot of the session that was open last, None before the first.
+    """Return the foot of the last open session, None before the first.
 
     Args:
         data: the data folder.
-        is_simulated: kind of sessions; the other kind has another rig.
+        is_simulated: kind of sessions to consider.
     """
     mounted: list[tuple[int, str, MountedFoot]] = []
     for folder in list_sessions(data):
@@ -189,10 +189,10 @@ def confirm_foot(
     operator: OperatorInput,
     console: Console,
 ) -> CheckResult:
-    """Return the line about the foot for the page; ask when it has changed.
+    """Return the line of the foot for the page; asks if the foot has changed.
 
     Raises:
-        SessionError: it was not confirmed.
+        SessionError: the change was not confirmed.
     """
     if before is None or before.foot == row.foot:
         return CheckResult(GOOD, "foot", row.foot)

@@ -1,4 +1,4 @@
-"""Connects the rig, and says why an arm cannot be reached."""
+"""Connect the rig, or explain why the arm cannot be reached."""
 
 from acquisition.errors import (
     DeviceFaultError,
@@ -24,9 +24,9 @@ def connect_rig(
     """Return the rig with its bus open.
 
     Args:
-        settings: of the rig.
-        row: of the matrix.
-        fake: how a simulation runs; None = the real rig.
+        settings: all settings.
+        row: row of the matrix.
+        fake: options of a simulation; None = the real rig.
 
     Raises:
         PreflightError: the CAN interface cannot be used.
@@ -38,9 +38,9 @@ def connect_rig(
 
 
 def not_reached(error: TractionError, settings: RigSettings) -> PreflightError:
-    """Return the refusal of an arm that cannot be reached, or answers wrongly.
+    """Return the error for an arm that cannot be reached, or answers wrongly.
 
-    A bus that is down gets the catalogue's message, with the command that helps.
+    A bus that is down gets the message of the catalogue, with the command to start it.
     """
     is_up = isinstance(error, LinkTimeoutError | LinkFullError)
     is_bus = isinstance(error, LinkError) and not is_up
@@ -52,7 +52,7 @@ def not_reached(error: TractionError, settings: RigSettings) -> PreflightError:
 
 
 def as_preflight(error: TractionError, arm_state: str) -> PreflightError:
-    """Return `error` as a refusal to begin; `arm_state` where it names none."""
+    """Return `error` as a preflight error, with `arm_state` if it has none."""
     arm_state = error.arm_state or arm_state
     is_of_device = isinstance(error, LinkError | DeviceFaultError | UnfitDeviceError)
     kind = UnfitDeviceError if is_of_device else PreflightError

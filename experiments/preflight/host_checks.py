@@ -1,4 +1,4 @@
-"""What the preflight says of the computer, the running force sensor and the loads."""
+"""Checks of computer, settings, calibrations and the running force sensor."""
 
 import shutil
 import tomllib
@@ -23,26 +23,26 @@ from wam.bus.socketcan import LONGEST_QUEUE, interface_state
 CPUS = Path("/sys/devices/system/cpu")
 FAST = "performance"
 SESSION_GB = 0.9
-# Days after which a calibration is due: drives wear, feet and containers are moved.
+# Days after which a calibration is due: drives wear, feet and containers move.
 CALIBRATION_DAYS = {
     "gravity": 180,
     "friction": 90,
     "sensor": 365,
     "terrain": 90,
 }
-NOISY = 0.5  # N, several times what a quiet sensor shows
+NOISY = 0.5  # N, several times the noise of a quiet sensor
 
 
-DiskProbe = Callable[[Path], int]  # a folder in, free bytes there out
+DiskProbe = Callable[[Path], int]  # free bytes on the disk of a folder
 
 
 def free_bytes(folder: Path) -> int:
-    """Return how much room is left where `folder` is [bytes]."""
+    """Free space on the disk of `folder` [bytes]."""
     return shutil.disk_usage(folder).free
 
 
 def check_governor(cpus: Path = CPUS) -> CheckResult:
-    """Grade how the processors' clocks are governed."""
+    """Grade the CPU frequency governor."""
     governors: set[str] = set()
     for path in cpus.glob("cpu[0-9]*/cpufreq/scaling_governor"):
         try:
@@ -59,7 +59,7 @@ def check_governor(cpus: Path = CPUS) -> CheckResult:
 
 
 def check_code(fields: dict[str, str]) -> CheckResult:
-    """Grade the version of the program; `facts` are those of provenance."""
+    """Grade the version of the program; `fields` are those of provenance."""
     commit = fields["commit"][:10]
     if fields["dirty"] == "true":
         text = f"{fields['software']} {commit}, changed since: the diff is recorded"
@@ -68,11 +68,11 @@ def check_code(fields: dict[str, str]) -> CheckResult:
 
 
 def check_origin(rig: Rig, law: str) -> CheckResult:
-    """Grade where the settings come from: the shipped ones describe no real arm.
+    """Grade the origin of the settings: the shipped ones describe no real arm.
 
     Args:
-        rig: with its settings.
-        law: what floats the arm, in words.
+        rig: the rig with its settings.
+        law: description of the control law.
     """
     text = f"{rig.settings.origin}, {rig.row.name}, {law}"
     if rig.is_simulated or rig.settings.origin != SHIPPED:
@@ -82,7 +82,7 @@ def check_origin(rig: Rig, law: str) -> CheckResult:
 
 
 def check_ages(rig: Rig) -> CheckResult | None:
-    """Grade the calibrations that are used by their age; None = none is used."""
+    """Grade the calibrations in use by their age; None = none in use."""
     section = rig.settings.rig
     used = [
         (section.gravity.file, "gravity", rig.calibrations.gravity),
@@ -107,10 +107,10 @@ def check_ages(rig: Rig) -> CheckResult | None:
 
 
 def measured_at(text: str) -> datetime | None:
-    """Return when a calibration was made, with its zone; None where it does not say.
+    """Return the time of a calibration, with time zone; None if not stated.
 
     Args:
-        text: of its file, TOML.
+        text: content of its file, TOML.
     """
     try:
         stated = tomllib.loads(text).get("measured_utc")
@@ -121,12 +121,12 @@ def measured_at(text: str) -> datetime | None:
 
 
 def _age(made: datetime | None, now: datetime, most: int) -> tuple[str, str]:
-    """Return the age of a calibration in words, and why it is due; "" = it is not.
+    """Return the age of a calibration as text, and why it is due; "" = it is not.
 
     Args:
-        made: when it was; None = it does not say.
-        now: with its zone.
-        most: days for which it counts.
+        made: time of the calibration; None = unknown.
+        now: present time, with time zone.
+        most: validity [days].
     """
     due = f"due after {most}:"
     if made is None:
@@ -141,7 +141,7 @@ def check_wrenches(samples: Record, now_ns: int, stale_ms: float) -> CheckResult
     """Grade rate, age and noise of force samples.
 
     Args:
-        samples: newest records of the ring buffer of wrenches, oldest first.
+        samples: latest records of the ring buffer of wrenches, oldest first.
         now_ns: monotonic time [ns].
         stale_ms: age at which a sample counts as stale [ms].
     """
@@ -163,11 +163,11 @@ def check_wrenches(samples: Record, now_ns: int, stale_ms: float) -> CheckResult
 
 
 def reach_words(fields: Mapping[str, str], lever: float) -> str:
-    """Return the largest traction that a sensor with these facts can measure.
+    """Return the largest traction that the sensor can measure, as text.
 
     Args:
-        fields: what it says about itself; "ranges" has six numbers [N, N m].
-        lever: how far below its origin the sole is [m].
+        fields: description of the sensor; "ranges" has six numbers [N, N m].
+        lever: distance of the sole below its origin [m].
     """
     fx, fy, fz, tx, ty, tz = map(float, fields["ranges"].split())
     most = largest_traction((fx, fy, fz, tx, ty, tz), lever)
@@ -177,11 +177,11 @@ def reach_words(fields: Mapping[str, str], lever: float) -> str:
 def check_contact_limits(
     rig: RigSettings, fields: Mapping[str, str]
 ) -> CheckResult | None:
-    """Grade the limits of contact by what the sensor measures; None = all within.
+    """Grade the contact limits against the range of the sensor; None = all within.
 
     Args:
-        rig: the settings; a sensor whose range they know has lowered them.
-        fields: what the sensor says about itself; "ranges" has six numbers [N, N m].
+        rig: the settings; a sensor of known range has lowered the limits.
+        fields: description of the sensor; "ranges" has six numbers [N, N m].
     """
     lowered = [f"{name} {most:g}" for name, most in rig.lowered_limits().items()]
     if lowered:
@@ -202,7 +202,7 @@ def check_contact_limits(
 
 
 def check_stream(fields: Mapping[str, str]) -> CheckResult | None:
-    """Grade a serial stream by what became of it; None for a sensor on the bus."""
+    """Grade a serial stream by its losses and bursts; None for a sensor on the bus."""
     name = "F/T stream"
     if "frames" not in fields and "trouble" not in fields:
         return None
@@ -219,13 +219,13 @@ def check_stream(fields: Mapping[str, str]) -> CheckResult | None:
 
 
 def check_disk(data: Path, limit: float, add: AddLine, probe: DiskProbe) -> None:
-    """Grade the free space where the data folder is going to be.
+    """Grade the free space on the disk of the data folder.
 
     Args:
         data: the folder; it need not exist yet.
-        limit: least that must be free [GB].
-        add: takes mark, name and text of the line.
-        probe: tells how much room is left on a disk.
+        limit: required free space [GB].
+        add: receives mark, name and text of the line.
+        probe: returns the free space on a disk.
 
     Raises:
         PreflightError: less is free than the limit, or than a session needs.
@@ -241,11 +241,11 @@ def check_disk(data: Path, limit: float, add: AddLine, probe: DiskProbe) -> None
 
 
 def check_interface(channel: str) -> CheckResult | None:
-    """Grade an interface of SocketCAN; None where it is not there at all."""
+    """Grade a SocketCAN interface; None if it does not exist."""
     try:
         state = interface_state(channel)
     except OSError:
-        return None  # the arm's check says so, with its fix
+        return None  # reported by the check of the arm, with advice
     name = "CAN interface"
     if not state.is_up:
         return CheckResult(WARNING, name, f"{channel} is down")

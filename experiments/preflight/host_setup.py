@@ -1,9 +1,8 @@
-"""What the computer at an arm needs, as files of its system.
+"""System files for the computer at an arm.
 
-Rights of real time go to members of a group by the limits of PAM (limits.conf(5)),
-the latency of the processors and the sensor's adapter to groups by rules of udev(7).
-The CAN interface is brought up by a unit of systemd (systemd.unit(5)) as soon as its
-adapter is there.
+PAM limits (limits.conf(5)) grant real-time rights to a group; udev rules (udev(7))
+grant access to the CPU latency and to the sensor's adapter. A systemd unit
+(systemd.unit(5)) brings the CAN interface up as soon as its adapter appears.
 """
 
 import os
@@ -19,7 +18,7 @@ from wam.bus.socketcan import LONGEST_QUEUE
 
 GROUP = "traction"
 SERIAL_GROUP = "dialout"
-SENSOR_LINK = "traction-ft"  # below /dev, whichever port the sensor is plugged in
+SENSOR_LINK = "traction-ft"  # in /dev, for any port of the sensor
 RULES = Path("/etc/udev/rules.d/80-traction.rules")
 LIMITS = Path("/etc/security/limits.d/80-traction.conf")
 UNITS = Path("/etc/systemd/system")
@@ -32,11 +31,11 @@ _PRIORITY, _NICE = 90, -20
 
 @dataclass(frozen=True, slots=True)
 class HostFile:
-    """A file of the system.
+    """A system file.
 
     Attributes:
-        path: where it stands.
-        text: what stands in it.
+        path: absolute path.
+        text: content.
     """
 
     path: Path
@@ -45,17 +44,16 @@ class HostFile:
 
 @dataclass(frozen=True, slots=True)
 class HostSetup:
-    """What a computer needs for an arm.
+    """Setup of a computer for an arm.
 
     Attributes:
-        user: who runs the program.
-        channel: CAN interface of the kernel; None = the bus is no SocketCAN.
-        bitrate: of the bus [bit/s].
-        serial: serial number of the sensor's adapter; None = the sensor has no port, or
-            none was found.
+        user: user who runs the program.
+        channel: SocketCAN interface; None = another kind of bus.
+        bitrate: bit rate of the bus [bit/s].
+        serial: serial number of the sensor's adapter; None = no port, or none found.
 
     Raises:
-        SettingsError: a name that is none of its kind.
+        SettingsError: an invalid name.
     """
 
     user: str
@@ -75,11 +73,11 @@ class HostSetup:
                 )
 
     def files(self) -> list[HostFile]:
-        """Return the files, each with the mark that it is written again."""
-        made = [HostFile(RULES, self._rules()), HostFile(LIMITS, self._limits())]
+        """Return the files, each marked as generated."""
+        files = [HostFile(RULES, self._rules()), HostFile(LIMITS, self._limits())]
         if self.channel is not None:
-            made.append(HostFile(UNITS / self.unit, self._unit(self.channel)))
-        return [HostFile(file.path, _MARK + file.text) for file in made]
+            files.append(HostFile(UNITS / self.unit, self._unit(self.channel)))
+        return [HostFile(file.path, _MARK + file.text) for file in files]
 
     @property
     def unit(self) -> str:
@@ -87,7 +85,7 @@ class HostSetup:
         return f"traction-{self.channel}.service"
 
     def commands(self) -> list[tuple[str, ...]]:
-        """Return what is run once: groups before the files are read again."""
+        """Return the commands to run once, groups before the reload of the files."""
         lines: list[tuple[str, ...]] = [
             ("groupadd", "--force", "--system", GROUP),
             ("usermod", "--append", "--groups", f"{GROUP},{SERIAL_GROUP}", self.user),
@@ -146,15 +144,14 @@ WantedBy={device}.device
 
 
 def install(setup: HostSetup, root: Path) -> list[Path]:
-    """Write the files below a root; return those that were not there so before.
+    """Write the files below a root; returns those that changed.
 
     Args:
-        setup: what is needed.
-        root: "/", or the folder of an image of a system.
+        setup: the setup.
+        root: "/", or the folder of a system image.
 
     Raises:
-        SettingsError: a file is there that somebody else wrote, or none can be written;
-            then nothing was.
+        SettingsError: a file of other origin exists, or a file cannot be written.
     """
     wanted = {root / file.path.relative_to("/"): file.text for file in setup.files()}
     changed: list[Path] = []
@@ -165,14 +162,14 @@ def install(setup: HostSetup, root: Path) -> list[Path]:
                     f"{path.parent} leads out of {root}.",
                     hint="Nothing was written.",
                 )
-            there = path.read_text(errors="replace") if os.path.lexists(path) else None
-            if there is not None and (path.is_symlink() or not there.startswith(_MARK)):
+            old = path.read_text(errors="replace") if os.path.lexists(path) else None
+            if old is not None and (path.is_symlink() or not old.startswith(_MARK)):
                 raise SettingsError(
                     f"{path} was not written by traction setup.",
                     hint="Move it away, or add the lines of traction setup --print to "
                     "it. Nothing was written.",
                 )
-            if there != text:
+            if old != text:
                 changed.append(path)
         for path in changed:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -187,7 +184,7 @@ def install(setup: HostSetup, root: Path) -> list[Path]:
 
 
 def run_all(commands: Sequence[Sequence[str]]) -> list[str]:
-    """Run commands; return a sentence for each that failed."""
+    """Run commands; returns a sentence for each that failed."""
     failed: list[str] = []
     for command in commands:
         try:
@@ -198,6 +195,6 @@ def run_all(commands: Sequence[Sequence[str]]) -> list[str]:
             failed.append(f"{' '.join(command)}: {error}")
             continue
         if done.returncode:
-            told = done.stderr.strip() or f"exit code {done.returncode}"
-            failed.append(f"{' '.join(command)}: {told[:200]}")
+            reason = done.stderr.strip() or f"exit code {done.returncode}"
+            failed.append(f"{' '.join(command)}: {reason[:200]}")
     return failed

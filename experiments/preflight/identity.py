@@ -1,4 +1,4 @@
-"""Is this the arm that its files were measured on? The pucks' serial numbers tell."""
+"""Identity check: was every file in use measured on this arm? By serial numbers."""
 
 from acquisition.errors import IDLE_ARM, PreflightError, SettingsError
 from experiments.operator.console import BAD, GOOD, AddLine
@@ -10,33 +10,33 @@ from wam.driver.startup import ArmInfo
 
 
 def serial_numbers(rig: Rig, info: ArmInfo) -> tuple[int, ...] | None:
-    """Return the serial numbers of a real arm's pucks; None = not all are known."""
-    known = [puck.serial for puck in info.pucks]
-    serials = tuple(serial for serial in known if serial is not None)
-    return None if rig.is_simulated or len(serials) < len(known) else serials
+    """Return the serial numbers of a real arm's pucks; None = incomplete."""
+    read = [puck.serial for puck in info.pucks]
+    serials = tuple(serial for serial in read if serial is not None)
+    return None if rig.is_simulated or len(serials) < len(read) else serials
 
 
 def measured_on(rig: Rig) -> dict[str, tuple[int, ...] | None]:
-    """Return by file or setting in use which pucks it was measured with.
+    """Return the serial numbers that each file or setting in use was measured with.
 
     Raises:
-        SettingsError: a calibration is none.
+        SettingsError: a calibration is invalid.
     """
     settings, texts = rig.settings.rig, rig.calibrations
     noted: dict[str, tuple[int, ...] | None] = {}
     if settings.arm.mech_at_home is not None:
         noted["mech_at_home of rig.toml"] = settings.arm.serial_numbers
     if settings.gravity.model == "calibrated":
-        weighed = gravity_from_toml(texts.gravity, settings.gravity.file)
-        noted[settings.gravity.file] = weighed.arm
+        gravity = gravity_from_toml(texts.gravity, settings.gravity.file)
+        noted[settings.gravity.file] = gravity.arm
     if settings.friction.model == "calibrated":
-        rubbed = friction_from_toml(texts.friction, settings.friction.file)
-        noted[settings.friction.file] = rubbed.arm
+        friction = friction_from_toml(texts.friction, settings.friction.file)
+        noted[settings.friction.file] = friction.arm
     return noted
 
 
 def check_identity(rig: Rig, add: AddLine) -> None:
-    """Compare the serial numbers of this arm with those that its files state.
+    """Compare the serial numbers of this arm with those in its files.
 
     Raises:
         PreflightError: a file was measured on another arm.

@@ -1,4 +1,4 @@
-"""What the loop achieves on this machine: cadence, exchange, load, memory, recorder."""
+"""Benchmark of the loop: cadence, exchange, CPU load, memory, recorder."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from experiments.session.sidecar import TIME_LIMIT
 if TYPE_CHECKING:
     from experiments.rig.rig import Rig
 
-SETTLE = 1.0  # s before anything is measured
-WARM = 180.0  # s, or half of the time, after which memory has to stay as it is
+SETTLE = 1.0  # s, before the measurement
+WARM = 180.0  # s, or half of the time, after which memory must not grow
 _TICKS = os.sysconf("SC_CLK_TCK")
 
 
 @dataclass(frozen=True, slots=True)
 class ProcessUse:
-    """What one process used.
+    """Resources used by one process.
 
     Attributes:
-        name: of the process.
+        name: name of the process.
         cpu: share of one core.
-        growth_kb: peak of resident memory at the end less the peak when warm [KiB].
-        page_faults: pages it had to wait for since it was warm.
+        growth_kb: growth of peak resident memory after the warm-up [KiB].
+        page_faults: page faults after the warm-up.
     """
 
     name: str
@@ -47,16 +47,16 @@ class ProcessUse:
 
 @dataclass(frozen=True, slots=True)
 class BenchReport:
-    """What a run of the loop says about this machine.
+    """Result of a benchmark of the loop.
 
     Attributes:
         loop: quantiles of the loop's times.
-        processes: what each process used.
-        is_powered: the control law ran, to the end; otherwise the arm was idle.
-        fault: what the guard said while it was measured, as a message; "" = nothing.
+        processes: resources used by each process.
+        is_powered: whether the control law ran to the end; otherwise the arm was idle.
+        fault: message of the guard's fault; "" = none.
         recorded: cycles in the recorded files.
-        lost: cycles the recorder lost.
-        largest_backlog: cycles that waited for the recorder at most.
+        lost: cycles lost by the recorder.
+        largest_backlog: largest number of cycles waiting for the recorder.
     """
 
     loop: LoopReport
@@ -80,10 +80,9 @@ class _Usage:
 
 
 def run_bench(rig: Rig, processes: dict[str, int], seconds: float) -> BenchReport:
-    """Let the loop of `rig` run for `seconds` with the recorder on, and measure.
+    """Run the loop of `rig` for `seconds` with the recorder on, and measure.
 
-    The arm of a real rig stays idle and gets no torque; a simulated one is held by the
-    control law.
+    A real arm stays idle without torque; a simulated one is held by the control law.
 
     Raises:
         PreflightError: no cycle ran.
@@ -124,10 +123,10 @@ def run_bench(rig: Rig, processes: dict[str, int], seconds: float) -> BenchRepor
 
 
 class _Trials:
-    """Records one trial after the other, none longer than a trial may be.
+    """Records consecutive trials, none longer than the time limit.
 
-    Each file begins with the second before it, so a second of every trial is recorded
-    twice; each is verified, counted and thrown away.
+    Each file begins with the second before its start, so one second of every trial is
+    recorded twice; each file is verified, counted and deleted.
     """
 
     def __init__(self, rig: Rig, folder: Path) -> None:
@@ -136,7 +135,7 @@ class _Trials:
         self._path = folder / "bench.mcap"
 
     def record(self, seconds: float) -> None:
-        """Let the loop run for `seconds` with the recorder on."""
+        """Run the loop for `seconds` with the recorder on."""
         recorder = self._rig.backend.recorder
         while seconds > 0.0:
             recorder.start(self._path, _header())
@@ -151,18 +150,18 @@ class _Trials:
 
 
 class _Collector:
-    """Reads the buffer of timings as it fills; it holds a minute only."""
+    """Reads the buffer of timings as it fills, since it holds only a minute."""
 
     def __init__(self, rig: Rig, seconds: float) -> None:
         self._timings = rig.backend.loop_client.timings()
         self._rig = rig
         self._count = 0
-        # Taken now, page by page: the console's memory is measured too.
+        # Allocated and touched now, since the console's memory is measured too.
         self._records = np.zeros(int(seconds * 510) + 2000, TIMING_DTYPE)
         self._records["number"] = 1
-        rig.backend.loop_client.on_tick.append(self._look)
+        rig.backend.loop_client.on_tick.append(self._collect)
 
-    def _look(self) -> None:
+    def _collect(self) -> None:
         new = self._timings.read()
         new = new[: len(self._records) - self._count]
         self._records[self._count : self._count + len(new)] = new
@@ -170,7 +169,7 @@ class _Collector:
 
     def take(self) -> Record:
         """Return every record since the start."""
-        self._rig.backend.loop_client.on_tick.remove(self._look)
+        self._rig.backend.loop_client.on_tick.remove(self._collect)
         return self._records[: self._count]
 
 

@@ -1,4 +1,4 @@
-"""The page of the preflight: a line for each check, refusals kept to its end."""
+"""The page of the preflight: one line per check, errors raised at its end."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,10 +20,10 @@ class CheckResult:
 
 
 class ChecksPage:
-    """The lines of the checks; one that fails does not hide the next.
+    """Lines of the checks; a failure does not prevent the next check.
 
     Attributes:
-        checks: what was printed.
+        checks: the printed lines.
     """
 
     def __init__(self, console: Console) -> None:
@@ -37,16 +37,16 @@ class ChecksPage:
         self._console.check(mark, name, text)
 
     def add_result(self, result: CheckResult | None) -> None:
-        """Print the line of a check, if it had anything to say."""
+        """Print the line of a check, if it has one."""
         if result is not None:
             self.add(result.mark, result.name, result.text)
 
     def fail(self, error: PreflightError) -> None:
-        """Keep a refusal until the other checks have been run."""
+        """Keep an error until the other checks have run."""
         self._failures.append(error)
 
     def attempt(self, check: Callable[[], _T]) -> _T | None:
-        """Return what a check returns, None when it refused."""
+        """Run a check; returns its result, None if it failed."""
         try:
             return check()
         except PreflightError as error:
@@ -54,7 +54,7 @@ class ChecksPage:
             return None
 
     def require_fit(self) -> None:
-        """Raise the first refusal; the others are said before it."""
+        """Raise the first error, after printing the others."""
         if not self._failures:
             return
         first, *others = self._failures

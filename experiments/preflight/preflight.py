@@ -1,4 +1,4 @@
-"""Is the rig fit to run? Every check graded, with what to do beside it."""
+"""The preflight: graded checks of the rig, each with advice."""
 
 from collections.abc import Collection
 from dataclasses import asdict, dataclass, replace
@@ -55,7 +55,7 @@ class Preflight:
     devices: dict[str, str]
 
     def after(self, first: CheckResult) -> "Preflight":
-        """Return the page with the result of a check before it."""
+        """Return the page with another result as its first line."""
         return replace(self, checks=(first, *self.checks))
 
     def as_dict(self) -> dict[str, object]:
@@ -76,16 +76,16 @@ def run_preflight(
     The loop runs afterwards, the arm idle.
 
     Args:
-        rig: with its bus open.
+        rig: the rig with an open bus.
         data: the data folder.
-        console: where the page is printed.
-        seconds: how long the loop is tested [s]; None = `[loop] test_time`.
-        probe: tells how much room is left on the disk.
-        made_anew: of what a commissioning stands on, what follows measures anew; None =
-            no torque follows, and the arm need not be commissioned.
+        console: output of the page.
+        seconds: duration of the test of the loop [s]; None = `[loop] test_time`.
+        probe: returns the free space on the disk.
+        made_anew: inputs of the commissioning that are measured again; None = no
+            torque follows, and the arm need not be commissioned.
 
     Raises:
-        PreflightError: a check failed; all that do not need it were run.
+        PreflightError: a check failed; all independent ones were run.
     """
     page = ChecksPage(console)
     _check_host(rig, data, page, probe)
@@ -94,9 +94,9 @@ def run_preflight(
     if info is not None or not rig.settings.rig.ft_sensor.is_on_bus:
         arm_state = "not touched" if info is None else IDLE_ARM
         sensor = page.attempt(lambda: _check_sensor(rig, arm_state, page.add))
-    proofs: dict[str, str] = {}
+    commissioning: dict[str, str] = {}
     if info is not None and made_anew is not None and not rig.is_simulated:
-        proofs = (
+        commissioning = (
             page.attempt(
                 lambda: check_commissioned(rig, info, page.add, made_anew, sensor)
             )
@@ -118,12 +118,12 @@ def run_preflight(
     page.require_fit()
     devices = {f"ft_sensor:{key}": value for key, value in sensor.items()}
     return Preflight(
-        tuple(page.checks), {**devices, **info.metadata(), **grants, **proofs}
+        tuple(page.checks), {**devices, **info.metadata(), **grants, **commissioning}
     )
 
 
 def _check_host(rig: Rig, data: Path, page: ChecksPage, probe: DiskProbe) -> None:
-    """Grade what needs no device."""
+    """Run the checks that need no device."""
     settings = rig.settings.rig
     law = law_words(settings, rig.calibrations, rig.row.foot)
     page.add_result(check_origin(rig, law))
@@ -175,7 +175,7 @@ def _check_arm(rig: Rig, page: ChecksPage) -> ArmInfo:
 
 
 def _check_zero(rig: Rig, info: ArmInfo, add: AddLine) -> None:
-    """Compare the zero with mech_at_home, which is of the real arm.
+    """Compare the zero of a real arm with mech_at_home.
 
     Raises:
         PreflightError: the arm is zeroed elsewhere.
@@ -203,14 +203,14 @@ def _check_sensor(rig: Rig, arm_state: str, add: AddLine) -> dict[str, str]:
 
 
 def _lever(rig: Rig) -> float:
-    """Return how far below the sensor's origin the sole is [m]."""
+    """Distance of the sole below the sensor's origin [m]."""
     tool = rig.model.tool
     assert tool is not None
     return float(tool.sole[2] - tool.sensor_height)
 
 
 def _check_stream(rig: Rig, page: ChecksPage) -> None:
-    """Grade what became of the sensor's stream while the loop was tested."""
+    """Grade the sensor's stream during the test of the loop."""
     fields = rig.backend.sensor_metadata()
     result = check_stream(fields)
     page.add_result(result)
@@ -219,7 +219,7 @@ def _check_stream(rig: Rig, page: ChecksPage) -> None:
 
 
 def start_devices(rig: Rig) -> ArmInfo:
-    """Start arm, sensor and loop without a page; return what the arm says.
+    """Start arm, sensor and loop without a page; returns the arm's description.
 
     Raises:
         PreflightError: the arm or the sensor is not fit.
@@ -234,7 +234,7 @@ def start_devices(rig: Rig) -> ArmInfo:
 
 
 def _check_exchange(rig: Rig, add: AddLine) -> None:
-    """Grade the way from the request to the seventh position over this adapter."""
+    """Grade the time from the request to the seventh position."""
     measured = rig.backend.ask(MeasureExchange())
     times = np.array(measured.replies_ns)
     lost = EXCHANGE_CYCLES - len(times)
@@ -261,7 +261,7 @@ def _check_exchange(rig: Rig, add: AddLine) -> None:
 
 
 def _check_rights(rig: Rig, add: AddLine) -> dict[str, str]:
-    """Say what the kernel refused to each process; return it for the recording."""
+    """Report the kernel's refusals to each process; returns them as metadata."""
     fields: dict[str, str] = {}
     refused: list[str] = []
     for process, grants in rig.backend.grants().items():

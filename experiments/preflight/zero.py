@@ -1,4 +1,4 @@
-"""How far is the arm zeroed from where it was last time? Its absolute encoders tell."""
+"""Zero errors of the arm since the last zeroing, by its absolute encoders."""
 
 from experiments.rig.rig import Rig
 from wam.driver.home import zero_error
@@ -7,13 +7,13 @@ from wam.model.constants import Array
 
 
 def zero_errors(rig: Rig, info: ArmInfo) -> Array | None:
-    """Return by how much each joint's zero differs from mech_at_home [rad], (7,).
+    """Zero error of each joint against mech_at_home [rad], shape (7,).
 
-    None = that is not known, or the arm is simulated: it is noted of the real one.
+    None = unknown, or the arm is simulated: mech_at_home is that of the real one.
 
     Args:
-        rig: its loop runs.
-        info: of the start.
+        rig: the rig, its loop running.
+        info: result of the start.
     """
     noted = rig.settings.rig.arm.mech_at_home
     mech = [puck.mech for puck in info.pucks if puck.mech is not None]

@@ -1,5 +1,5 @@
-"""The whole study rehearsed on simulated devices: does the program find what is true.
+"""Rehearsal of the whole study on simulated devices, checked against bands.
 
-`recording` runs the sessions as a person would, `judging` analyses them and holds their
-measures against the `bands`; both work on one `plan`. Begin with `plan`.
+`recording` runs the sessions as a person would, `judging` analyses them and compares
+their measures with the `bands`; both use one `plan`. Begin with `plan`.
 """

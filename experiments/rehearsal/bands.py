@@ -1,23 +1,23 @@
 """The 43 bands that a simulated study has to meet, as data.
 
-Each band belongs to a statement of the paper or to what its models imply; they were set
-on simulations of another program. A measure may have several values, one per terrain or
-cell; all of them must be inside.
+Each band corresponds to a statement of the paper or an implication of its models; they
+were set on simulations of another program. A measure may have several values, one per
+terrain or cell; all must be inside.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-_ROUNDING = 1e-9  # a share of exactly 1 may come out above it
+_ROUNDING = 1e-9  # tolerance for a share of exactly 1
 
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """What one measure may be.
+    """Permitted range of one measure.
 
     Attributes:
         id: letter of the group and number.
-        what: the measure, in words.
+        what: description of the measure.
         least: smallest value allowed.
         most: largest value allowed.
     """
@@ -30,11 +30,11 @@ class Band:
 
 @dataclass(frozen=True, slots=True)
 class BandResult:
-    """One measure beside its band.
+    """One measure with its band.
 
     Attributes:
         band: the band.
-        values: what was measured; empty where it could not be.
+        values: measured values; empty if not measurable.
     """
 
     band: Band
@@ -51,7 +51,7 @@ class BandResult:
 
     @property
     def text(self) -> str:
-        """The values as a person reads them: one, or smallest and largest."""
+        """The values as text: one, or smallest and largest."""
         if not self.values:
             return "none"
         low, high = min(self.values), max(self.values)
@@ -106,9 +106,9 @@ BANDS = (
 
 
 def hold_against_bands(measures: Mapping[str, Sequence[float]]) -> list[BandResult]:
-    """Return every band with what was measured, in order.
+    """Return every band with its measured values, in order.
 
     Args:
-        measures: values by the id of the band; one that is missing is not met.
+        measures: values by the id of the band; a missing one is not met.
     """
     return [BandResult(band, tuple(measures.get(band.id, ()))) for band in BANDS]

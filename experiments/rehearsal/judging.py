@@ -1,4 +1,4 @@
-"""The recorded study analysed and held against its bands."""
+"""Analysis of the rehearsed study, compared with its bands."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -21,37 +21,36 @@ from experiments.report.truth_errors import compare_with_truth, z_scores
 from experiments.session.store import list_sessions
 
 WHOLE = 10  # trials per terrain from which every band applies
-_OF_FEW = ("D", "E", "F", "T")  # groups that apply to fewer
-_UNHINDERED = 0.02  # share of friction at which slips go back
-_GOING_BACK = {"D5", "E3"}  # bands on slips that go back
+_OF_FEW = ("D", "E", "F", "T")  # groups that apply with fewer trials
+_UNHINDERED = 0.02  # largest share of friction with bounce-back of slips
+_BOUNCE_BACK = {"D5", "E3"}  # bands on bounce-back
 
-# Beside the 43: not met unless frames, signs, tare and kinematics are right.
+# Further bands, met only if frames, signs, tare and kinematics are right.
 TRUTH_BANDS = (
     Band("T1", "v_t against the truth, rms, each terrain's worst trial (mm/s)", 0, 1.5),
     Band("T2", "F_t against the truth, mean |error|, all trials (N)", 0.2, 0.6),
     Band("T3", "F_n against the truth, mean |error|, all trials (N)", 0.2, 0.6),
     Band("T4", "error of mean F_t and F_n / uncertainty by the tares, rms", 0.8, 1.2),
 )
-# A rig without faults is not doubted; too few samples are, which E11 judges.
+# A rig without faults causes no doubts, except about too few samples (E11).
 DOUBT_BAND = Band("T5", "trials that are doubted without a fault", 0, 0)
 
 
 def gated(plan: AcceptancePlan, results: Sequence[BandResult]) -> list[BandResult]:
     """Return the bands that decide.
 
-    Slips hardly go back on an arm whose wrist rubs: beyond a share of 0.02 the bands
-    on that are reported and do not decide. An arm that rubs more than the usual one is
-    judged by nobody.
+    Friction of the wrist suppresses bounce-back: beyond a share of 0.02 its bands are
+    reported but do not decide. With more friction than the usual arm no band decides.
     """
     if plan.friction > FRICTION:
         return []
     if plan.friction <= _UNHINDERED:
         return list(results)
-    return [result for result in results if result.band.id not in _GOING_BACK]
+    return [result for result in results if result.band.id not in _BOUNCE_BACK]
 
 
 def analyse(plan: AcceptancePlan, data: Path) -> list[BandResult]:
-    """Analyse the study in `data` and hold it against its bands.
+    """Analyse the study in `data` and compare it with its bands.
 
     With fewer than ten trials only the bands on slips, samples and truth are returned.
     """
@@ -85,7 +84,7 @@ def analyse(plan: AcceptancePlan, data: Path) -> list[BandResult]:
 
 
 def as_plain(plan: AcceptancePlan, results: Sequence[BandResult]) -> dict[str, object]:
-    """Return plan and findings as values for JSON."""
+    """Return plan and results as values for JSON."""
     return {
         "plan": {**asdict(plan), "config": str(plan.config or "shipped default")},
         "bands": [
@@ -134,6 +133,6 @@ def _truth(trials: dict[str, list[RecordedTrial]]) -> list[BandResult]:
 
 
 def _predicted(trials: Sequence[RecordedTrial]) -> tuple[float, ...]:
-    """Return the rms of the errors over their uncertainty, one value of all forces."""
+    """Rms of the errors divided by their uncertainty, one value for all forces."""
     scores = z_scores(trials)
     return (float(np.sqrt(np.mean(scores**2))),) if scores.size else ()

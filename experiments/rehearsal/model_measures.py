@@ -1,4 +1,4 @@
-"""Groups A, B and C of the bands, and E7: what the models of a study show."""
+"""Measures of groups A, B and C, and E7: models of a study."""
 
 from dataclasses import dataclass
 from importlib import import_module
@@ -32,7 +32,7 @@ class _Errors:
         return float(np.mean(self.cells[terrain][tested]))
 
     def ratio(self, terrain: str, tested: str) -> float:
-        """Return the error of a foreign model over that of the own one."""
+        """Ratio of the error of another terrain's model to that of its own."""
         return self.mean(terrain, tested) / self.mean(tested, tested)
 
 
@@ -40,8 +40,8 @@ def measure_models(study: Study) -> dict[str, list[float]]:
     """Return the values of A1 to C4 and E7, by id.
 
     Args:
-        study: of all terrains, with Tustin and GP-SE models. Flat terrains are plates,
-            all others stones.
+        study: study of all terrains, with Tustin and GP-SE models. Flat terrains are
+            plates, all others stones.
     """
     flats = [name for name, kind in study.kinds.items() if kind == FLAT]
     stones = [name for name, kind in study.kinds.items() if kind != FLAT]
@@ -67,7 +67,7 @@ def _errors_of(study: Study, model: str) -> _Errors:
                     error
                     for fold in result.models(model)
                     for error in (
-                        [one.mae for one in fold.scores]
+                        [score.mae for score in fold.scores]
                         if tested == name
                         else fold.cross[tested]
                     )
@@ -143,7 +143,7 @@ def _is_worse(errors: _Errors, name: str, tested: str) -> bool:
 
 
 def _chosen(errors: _Errors, stones: list[str]) -> dict[str, list[float]]:
-    """Return how often the model with the least error is the right one."""
+    """Share of trials whose best model is that of the right terrain or class."""
     is_class: list[bool] = []
     is_exact: list[bool] = []
     for tested in errors.cells:
@@ -159,7 +159,9 @@ def _spread(
     study: Study, stones: list[str], flats: list[str]
 ) -> dict[str, list[float]]:
     results = study.terrains
-    lag1, lag5 = zip(*(_memory(results[name]) for name in stones), strict=True)
+    lag1, lag5 = zip(
+        *(_autocorrelations(results[name]) for name in stones), strict=True
+    )
     smallest = min(_mean_of_folds(results[name], "variance") for name in stones)
     largest = max(_mean_of_folds(results[name], "variance") for name in flats)
     return {
@@ -183,31 +185,31 @@ def _residual(trial: PreparedTrial, fold: ModelFold) -> Array:
 
 
 def _r2(result: TerrainResult) -> float:
-    """Return the share of the variance that is explained on trials held out."""
+    """Coefficient of determination on held-out trials."""
     pairs = _held_out(result)
-    rest = np.concatenate([_residual(*pair) for pair in pairs])
+    residuals = np.concatenate([_residual(*pair) for pair in pairs])
     F_t = np.concatenate([trial.F_t for trial, _ in pairs])
-    return float(1.0 - (rest**2).sum() / ((F_t - F_t.mean()) ** 2).sum())
+    return float(1.0 - (residuals**2).sum() / ((F_t - F_t.mean()) ** 2).sum())
 
 
-def _memory(result: TerrainResult) -> tuple[float, float]:
-    """Return the residual's autocorrelation one and five kept samples on."""
-    one: list[float] = []
-    five: list[float] = []
+def _autocorrelations(result: TerrainResult) -> tuple[float, float]:
+    """Autocorrelation of the residuals at lags of one and five kept samples."""
+    lag1: list[float] = []
+    lag5: list[float] = []
     for trial, fold in _held_out(result):
-        rest = _residual(trial, fold)
-        one.append(_autocorrelation(rest, trial, 1))
-        five.append(_autocorrelation(rest, trial, 5))
-    return float(np.nanmean(one)), float(np.nanmean(five))
+        residuals = _residual(trial, fold)
+        lag1.append(_autocorrelation(residuals, trial, 1))
+        lag5.append(_autocorrelation(residuals, trial, 5))
+    return float(np.nanmean(lag1)), float(np.nanmean(lag5))
 
 
-def _autocorrelation(rest: Array, trial: PreparedTrial, lag: int) -> float:
-    """Return the correlation of residuals `lag` kept samples apart, gaps left out."""
+def _autocorrelation(residuals: Array, trial: PreparedTrial, lag: int) -> float:
+    """Autocorrelation of residuals at a `lag` in kept samples, without gaps."""
     step = int(np.min(np.diff(trial.indices)))
     is_near = trial.indices[lag:] - trial.indices[:-lag] == lag * step
     if np.count_nonzero(is_near) < 3:
         return float("nan")
-    before, after = rest[:-lag][is_near], rest[lag:][is_near]
+    before, after = residuals[:-lag][is_near], residuals[lag:][is_near]
     return float(np.corrcoef(before, after)[0, 1])
 
 

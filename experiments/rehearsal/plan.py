@@ -1,4 +1,4 @@
-"""What is rehearsed: which terrains, how often, with which arm."""
+"""Plan of a rehearsal: terrains, trials and arm."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,20 +6,21 @@ from pathlib import Path
 
 @dataclass(frozen=True, slots=True)
 class AcceptancePlan:
-    """What is rehearsed.
+    """Plan of a rehearsal.
 
     Attributes:
         config: a rig.toml; None = as shipped.
         terrains: names of the terrains, in the matrix's order.
-        plates: those of them without stones by the matrix; kept with the results.
+        plates: terrains without stones; stored with the results.
         travel: length of the shortest container [m].
-        trials: of each.
-        seed: of everything random.
-        friction: of the joints, as a share of what was identified on another arm.
-        jobs: processes at a time; None = one per core.
-        cables: resonance of the joints on their cables [Hz]; None = stiff ones.
-        mount: turns of the true base about x, then y, then z [degrees]; None = none.
-        wrong: name of the wrong rig that it is; "" = none.
+        trials: number of trials per terrain.
+        seed: seed of all random numbers.
+        friction: joint friction as a share of that identified on another arm.
+        jobs: number of parallel processes; None = one per core.
+        cables: resonance of the joints on their cables [Hz]; None = stiff cables.
+        mount: true rotations of the base about x, then y, then z [degrees]; None =
+            none.
+        wrong: name of the wrong rig; "" = none.
     """
 
     config: Path | None

@@ -1,4 +1,4 @@
-"""The study recorded through the wire, each session by the program itself."""
+"""Recording of the study, each session by `traction run` in its own process."""
 
 import contextlib
 import os
@@ -13,20 +13,20 @@ from pathlib import Path
 from acquisition.errors import SessionError
 from experiments.rehearsal.plan import AcceptancePlan
 
-_RUBS = 0.1  # share of friction from which there is something to compensate
+_COMPENSATED_FROM = 0.1  # share of friction from which compensation is useful
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def calibrate_arm(plan: AcceptancePlan, data: Path) -> AcceptancePlan:
-    """Return the plan for the arm whose friction was calibrated and is compensated.
+    """Calibrate the friction of the arm; returns the plan with its compensation.
 
-    The calibration is the one of `traction calibrate friction`, in `data`/rig. A rig
-    that somebody has described is taken as it is, as is one that hardly rubs.
+    Runs `traction calibrate friction` in `data`/rig. A rig with its own rig.toml, or
+    with little friction, is used unchanged.
 
     Raises:
-        SessionError: the calibration failed; its words are in `data`.
+        SessionError: the calibration failed; its output is in `data`.
     """
-    if plan.config is not None or plan.friction < _RUBS:
+    if plan.config is not None or plan.friction < _COMPENSATED_FROM:
         return plan
     data.mkdir(parents=True, exist_ok=True)
     folder, calibration = data / "rig", data / "calibration"
@@ -52,12 +52,12 @@ def calibrate_arm(plan: AcceptancePlan, data: Path) -> AcceptancePlan:
 def record_study(
     plan: AcceptancePlan, data: Path, say: Callable[[str], None] = lambda _: None
 ) -> None:
-    """Record a session on every terrain into `data`, terrains side by side.
+    """Record a session on every terrain into `data`, terrains in parallel.
 
-    Every session is the one that `traction run` makes, in a process of its own.
+    Every session is a `traction run` in a separate process.
 
     Raises:
-        SessionError: a session failed; its words are in `data`.
+        SessionError: a session failed; its output is in `data`.
     """
     data.mkdir(parents=True, exist_ok=True)
     with _single_threaded(), _pool(plan.jobs) as pool:
@@ -78,7 +78,7 @@ def record_study(
 
 
 def _record(arguments: list[str], folder: Path) -> int:
-    """Run one command of its own; what it says goes beside the data."""
+    """Run one command in a process; its output goes to a log next to the data."""
     command = [sys.executable, "-m", "experiments", *arguments]
     with folder.with_name(folder.name + ".log").open("w") as log:
         return subprocess.run(
@@ -108,7 +108,7 @@ def _arguments(plan: AcceptancePlan, terrain: str, data: Path) -> list[str]:
 
 
 def _arm(plan: AcceptancePlan) -> list[str]:
-    """Return the options that say which arm is simulated."""
+    """Return the options of the simulated arm."""
     kind = ["--friction", repr(plan.friction)]
     if plan.cables is not None:
         kind += ["--cables", repr(plan.cables)]
@@ -123,7 +123,7 @@ def _pool(jobs: int | None) -> Executor:
 
 @contextlib.contextmanager
 def _single_threaded() -> Generator[None]:
-    """Let processes started meanwhile use one thread for linear algebra each."""
+    """Limit processes started meanwhile to one linear-algebra thread each."""
     before = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update(dict.fromkeys(_THREADS, "1"))
     try:

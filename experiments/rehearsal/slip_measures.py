@@ -1,4 +1,4 @@
-"""Groups D, E and F of the bands: slips, samples and the sensor at rest."""
+"""Measures of groups D, E and F: slips, samples and the sensor at rest."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,10 +9,10 @@ from analysis.data.events import Slip
 from analysis.data.prepare import PreparedTrial
 from analysis.data.series import Array, TractionSeries
 
-LOW_FLOOR = 0.3  # of the peak
-_REST_MARGIN = 0.1  # s before the first motion that no longer counts as rest
+LOW_FLOOR = 0.3  # share of the peak
+_REST_MARGIN = 0.1  # s before the first motion, not counted as rest
 _SHORTEST_REST = 0.2  # s
-_START = 0.4  # s of a trial in which no foot moves yet
+_START = 0.4  # s at the start of a trial without motion of the foot
 _MOVING = 0.005  # m/s
 
 
@@ -21,10 +21,10 @@ class GroundTrials:
     """The trials of one terrain.
 
     Attributes:
-        is_plate: a flat plate, no stones.
-        series: as recorded.
-        prepared: smoothed, thinned, windowed.
-        slips: of every trial.
+        is_plate: whether it is a flat plate without stones.
+        series: recorded series.
+        prepared: series smoothed, thinned, windowed.
+        slips: slips of every trial.
     """
 
     is_plate: bool
@@ -42,12 +42,12 @@ class GroundTrials:
         return np.concatenate([getattr(trial, column) for trial in self.prepared])
 
     def share(self, name: str) -> float:
-        """Return a share of the thinned samples, mean over trials."""
+        """Mean share of the thinned samples over the trials."""
         return float(np.mean([getattr(t.shares, name) for t in self.prepared]))
 
 
 def measure_slips(grounds: Mapping[str, GroundTrials]) -> dict[str, list[float]]:
-    """Return the values of D1 to F2 but E7, by id."""
+    """Return the values of D1 to F2 except E7, by id."""
     stones = [g for g in grounds.values() if not g.is_plate]
     plates = [g for g in grounds.values() if g.is_plate]
     pooled = [slip for g in stones for of_trial in g.slips for slip in of_trial]
@@ -108,7 +108,7 @@ def _of_rest(
     starts = [
         float(s.F_t[s.t - s.t[0] < _START].mean()) for g in plates for s in g.series
     ]
-    # Differences of neighbours: neither drift nor load is in them.
+    # Differences of neighbouring samples are free of drift and load.
     white = [float(np.diff(rest).std() / np.sqrt(2.0)) for rest in rests]
     return {
         "F1": [float(np.median(white))] if white else [],
@@ -117,7 +117,7 @@ def _of_rest(
 
 
 def _rests(ground: GroundTrials) -> list[Array]:
-    """Return raw F_t of every trial before its foot moves [N]."""
+    """Raw F_t of every trial before its foot moves [N]."""
     rests: list[Array] = []
     for series, prepared in zip(ground.series, ground.prepared, strict=True):
         moving = np.flatnonzero(np.abs(prepared.smooth.v_t) > _MOVING)

@@ -1,5 +1,5 @@
-"""Recorded sessions, or tables from elsewhere, to studies and their pages.
+"""Reports: from recorded sessions or external tables to a study and its page.
 
-`sessions` and `external_tables` load the trials and fit them, `study_report` makes the
+`sessions` and `external_tables` load and fit the trials, `study_report` writes the
 page of either. Begin with `study_report`.
 """

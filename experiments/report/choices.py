@@ -1,4 +1,4 @@
-"""Choices of a report: its sessions, its analysis, and what else is asked for."""
+"""Choices of a report: its sessions, its analysis and further options."""
 
 import argparse
 from collections.abc import Iterable, Mapping, Sequence
@@ -29,13 +29,13 @@ from experiments.session.store import SessionFolder, find_session, list_sessions
 
 @dataclass(frozen=True, slots=True)
 class AnalysisChoices:
-    """What a person chose otherwise.
+    """Choices of the analysis.
 
     Attributes:
         prepare: smoothing, thinning and window.
-        bounds: box of the Tustin fit.
+        bounds: bounds of the Tustin fit.
         models: names of the models.
-        variants: what the study is repeated under.
+        variants: choices under which the study is repeated.
     """
 
     prepare: PrepareOptions = field(default_factory=PrepareOptions)
@@ -46,17 +46,17 @@ class AnalysisChoices:
 
 @dataclass(frozen=True, slots=True)
 class ReportRequest:
-    """How a report is made.
+    """Options of a report.
 
     Attributes:
-        seed: seed of the points of the Gaussian processes.
+        seed: seed of the training points of the Gaussian processes.
         terrains: names in the matrix's order; none for tables.
-        scheduler: address of a Dask scheduler to fit on; None for this machine.
-        choices: of the analysis.
-        missing: kept trials that are missing or changed, in words.
-        covariates: names of columns that are tested.
+        scheduler: address of a Dask scheduler; None = this machine.
+        choices: choices of the analysis.
+        missing: messages on missing or changed kept trials.
+        covariates: names of the columns to test.
         out: folder of the report; None = that of the session, or `data`/study.
-        with_pdf: figures are wanted as PDF, too.
+        with_pdf: write figures as PDF, too.
     """
 
     seed: int
@@ -75,17 +75,17 @@ class ReportRequest:
 
     @property
     def fit(self) -> FitOptions:
-        """How the models are fitted."""
+        """Options of the fits."""
         return FitOptions(
             self.choices.bounds, seed=self.seed, models=self.choices.models
         )
 
 
 def analysis_choices(args: argparse.Namespace) -> AnalysisChoices:
-    """Return the choices of `experiments.arguments.add_analysis`.
+    """Return the choices from the options of `experiments.arguments.add_analysis`.
 
     Raises:
-        SettingsError: one of them is no choice.
+        SettingsError: an option is invalid.
     """
     prepare = PrepareOptions()
     if args.smooth is not None:
@@ -108,7 +108,7 @@ def analysis_choices(args: argparse.Namespace) -> AnalysisChoices:
 
 
 def _parse_bounds(text: str) -> Mapping[str, tuple[float, float]]:
-    """Return the ranges in `b=-50:50,v_s=0.001:0.5`."""
+    """Parse ranges such as `b=-50:50,v_s=0.001:0.5`."""
     names = [name for name, _ in TustinBounds().items()]
     bounds: dict[str, tuple[float, float]] = {}
     for part in filter(None, text.split(",")):
@@ -173,10 +173,10 @@ def choose_sessions(
 def tell_missing(
     sessions: Sequence[SessionFolder], console: Console, *, allow_missing: bool
 ) -> list[str]:
-    """Name the kept trials that are missing or changed, and return the messages.
+    """Print and return messages on missing or changed kept trials.
 
     Raises:
-        KeptDataError: there are some, and `allow_missing` is false.
+        KeptDataError: there are such trials, and `allow_missing` is false.
     """
     deviations = check_kept(sessions, allow_missing=allow_missing)
     texts = [f"Not as in the journal: {deviation.text()}." for deviation in deviations]

@@ -1,4 +1,4 @@
-"""Which trials were recorded with an arm that is not commissioned completely."""
+"""Trials recorded with an arm whose commissioning was incomplete."""
 
 from collections.abc import Iterable, Mapping
 
@@ -10,21 +10,21 @@ _UNKNOWN = "uncommissioned: recorded without a commissioning"
 def uncommissioned(
     trials: Iterable[tuple[str, Mapping[str, Mapping[str, str]]]],
 ) -> list[str]:
-    """Return a sentence for each thing that commissioning left open, in their order.
+    """Return a sentence for each gap of the commissioning, in order.
 
-    A simulated arm needs none.
+    A simulated arm needs no commissioning.
 
     Args:
-        trials: name and metadata of each.
+        trials: names and metadata of the trials.
     """
-    open_points: dict[str, list[str]] = {}
+    gaps: dict[str, list[str]] = {}
     for name, metadata in trials:
         if metadata["trial"].get("simulated") == "true":
             continue
-        said = metadata.get("provenance", {}).get(FIELD, _UNKNOWN)
-        if said != COMPLETE:
-            open_points.setdefault(said, []).append(name)
-    return [f"{_span(names)}: {said}." for said, names in open_points.items()]
+        gap = metadata.get("provenance", {}).get(FIELD, _UNKNOWN)
+        if gap != COMPLETE:
+            gaps.setdefault(gap, []).append(name)
+    return [f"{_span(names)}: {gap}." for gap, names in gaps.items()]
 
 
 def _span(names: list[str]) -> str:

@@ -1,4 +1,4 @@
-"""Columns of trials that are tested beside a study: do they tell more of F_t?"""
+"""Tests of covariates: does a column of the trials improve the prediction of F_t?"""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -19,7 +19,7 @@ from analysis.study.study import Study
 from analysis.study.tasks import Workers
 from experiments.operator.console import WARNING, Console
 
-KNOWN = (*RECORDED, WAY)  # of recordings
+KNOWN = (*RECORDED, WAY)  # columns of recordings
 
 
 def columns_tested(
@@ -29,13 +29,13 @@ def columns_tested(
     console: Console,
     store: ResultStore | None = None,
 ) -> list[CovariateResult]:
-    """Return what columns tell on every terrain, and say so.
+    """Test columns on every terrain; returns and prints the results.
 
     Args:
-        study: of the trials; the test is made with its choices.
-        trials: by terrain, with the columns among their further inputs.
-        columns: their names.
-        console: is told.
+        study: study of the trials, whose choices the test uses.
+        trials: trials by terrain, with the columns among their further inputs.
+        columns: names of the columns.
+        console: output.
         store: results of earlier runs.
     """
     if not columns:
@@ -51,9 +51,9 @@ def columns_tested(
     results = covariate_results(rows, columns, options.fit, workers, store)
     for result in results:
         console.say(result.sentence)
-    told = {(result.terrain, result.column) for result in results}
+    tested = {(result.terrain, result.column) for result in results}
     for name, group in rows.items():
-        if lacking := [c for c in columns if (name, c) not in told]:
+        if lacking := [c for c in columns if (name, c) not in tested]:
             why = (
                 f"{len(group)} trials with samples, it takes {FEWEST}"
                 if len(group) < FEWEST
@@ -66,7 +66,7 @@ def columns_tested(
 def recorded_columns(
     files: Mapping[str, TrialFiles], columns: Sequence[str]
 ) -> dict[str, Iterable[TractionSeries]]:
-    """Return recorded trials with columns, read again one by one."""
+    """Return recorded trials with covariates, read again one by one."""
     asked = [name for name in columns if name in RECORDED]
     return {
         name: (with_covariates(trial, asked) for trial in group)

@@ -1,4 +1,4 @@
-"""Trials that are given twice: left out or not, they would be fitted as two."""
+"""Detection of duplicate trials, which would otherwise be fitted as two."""
 
 from hashlib import blake2b
 from typing import Any
@@ -7,17 +7,17 @@ from numpy.typing import NDArray
 
 
 class TrialDigests:
-    """What trials hold, to find one that holds the same as one before it."""
+    """Digests of trials, to find duplicates."""
 
     def __init__(self) -> None:
         self._first: dict[bytes, str] = {}
 
     def original(self, name: str, *columns: NDArray[Any]) -> str | None:
-        """Return the name of an earlier trial with the same columns; None without.
+        """Return the name of an earlier trial with the same columns, or None.
 
         Args:
-            name: of the trial.
-            columns: all that it holds.
+            name: name of the trial.
+            columns: its content.
         """
         digest = blake2b()
         for column in columns:

@@ -1,4 +1,4 @@
-"""From tables of trials to a report: what is refused, their study and the page."""
+"""Reports of external tables: checks, study and page."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -32,27 +32,27 @@ def report_tables_of_trials(
     request: ReportRequest,
     console: Console,
 ) -> Path:
-    """Fit trials from tables and write the report; return the page.
+    """Fit trials from tables and write the report; returns the page.
 
     Args:
-        files: where the trials come from.
+        files: files of the trials.
         out: folder of the report.
-        trials: by terrain.
-        with_columns: the same with the columns that are tested.
-        request: how the report is made.
-        console: is told what is done, and what is odd.
+        trials: trials by terrain.
+        with_columns: the same with the columns to test.
+        request: options of the report.
+        console: output of progress and warnings.
 
     Raises:
-        SettingsError: a choice does not suit tables, trials are simulated and recorded
-            ones or given twice, or none has a sample to fit.
+        SettingsError: a choice does not suit tables, simulated and recorded trials are
+            mixed, a trial is duplicate, or no sample is left to fit.
     """
     for choice in request.choices.variants:  # refused before anything is fitted
         choice.series(next(iter(trials.values()))[0])
     is_simulated = _is_simulated(trials)
     _refuse_repeated(trials)
     require_folder(out)
-    told = notes_of_tables(trials)
-    for note in told:  # before the work: a wrong unit shows here
+    notes = notes_of_tables(trials)
+    for note in notes:  # before the work: a wrong unit shows here
         console.say(f"{WARNING} {note}")
     count = sum(len(series) for series in trials.values())
     console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
@@ -75,13 +75,13 @@ def report_tables_of_trials(
     for note in study.groups:
         console.say(note)
     for warning in study.warnings:
-        if warning not in told:
+        if warning not in notes:
             console.say(f"{WARNING} {warning}")
     return page
 
 
 def require_samples(study: Study) -> None:
-    """Refuse a study of which nothing is left to fit.
+    """Refuse a study without a sample to fit.
 
     Raises:
         SettingsError: no terrain has a sample inside the window.
@@ -109,7 +109,7 @@ def require_samples(study: Study) -> None:
 
 
 def _import_tables(files: Sequence[Path]) -> list[ReportTable]:
-    """Return what the folders of imported trials tell of themselves."""
+    """Tables on the import, from the folders of imported trials."""
     folders = dict.fromkeys(path if path.is_dir() else path.parent for path in files)
     records = [read_record(folder) for folder in folders]
     return [t for record in records if record for t in import_tables(record)]
@@ -117,7 +117,7 @@ def _import_tables(files: Sequence[Path]) -> list[ReportTable]:
 
 def _refuse_repeated(trials: Trials) -> None:
     digests = TrialDigests()
-    for series in (one for group in trials.values() for one in group):
+    for series in (trial for group in trials.values() for trial in group):
         name = f"{series.terrain} {series.name}"
         columns = (series.t - series.t[0], series.v_t, series.F_n, series.F_t)
         if (original := digests.original(name, *columns)) is not None:
@@ -128,7 +128,7 @@ def _refuse_repeated(trials: Trials) -> None:
 
 
 def _is_simulated(trials: Trials) -> bool:
-    """Return whether the trials are simulated ones; a mixture is refused."""
+    """Return whether the trials are simulated; refuses a mixture."""
     kinds = {trial.is_simulated for series in trials.values() for trial in series}
     if len(kinds) > 1:
         raise SettingsError(

@@ -1,4 +1,4 @@
-"""How far a long computation is and how long it still takes, on one line."""
+"""Progress and remaining time of a long computation, on one line."""
 
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from acquisition.clock import NS_PER_S, Clock, SystemClock
 from experiments.operator.console import Console
 
-_STEP = 0.1  # of the whole between two plain lines
+_STEP = 0.1  # share of the work between two plain lines
 _BAR = 30  # characters
 
 
@@ -14,23 +14,23 @@ class ProgressLine:
     """Shows (done, total) as a bar with the time left; plain lines off a terminal.
 
     Args:
-        console: where it is shown.
-        clock: tells how long it has taken so far.
-        what: what is counted, e.g. "fits".
+        console: output.
+        clock: clock of the elapsed time.
+        what: counted items, e.g. "fits".
     """
 
     def __init__(self, console: Console, clock: Clock, what: str) -> None:
         self._console, self._clock, self._what = console, clock, what
-        self._began_ns = clock.now_ns()
+        self._start_ns = clock.now_ns()
         self._at_first: int | None = None
         self._reported = 0.0
 
     def __call__(self, done: int, total: int) -> None:
-        """Show that `done` of `total` are done."""
+        """Show that `done` of `total` items are done."""
         if self._at_first is None:
-            # results of an earlier run are there at once and say nothing of the speed
+            # results of an earlier run appear at once and do not count for the speed
             self._at_first = done - 1 if done == 1 else done
-        elapsed = (self._clock.now_ns() - self._began_ns) / NS_PER_S
+        elapsed = (self._clock.now_ns() - self._start_ns) / NS_PER_S
         left = time_left(done - self._at_first, total - done, elapsed)
         text = progress_text(done, total, left, self._what)
         if self._console.is_live:
@@ -40,7 +40,7 @@ class ProgressLine:
             self._console.say(text)
 
     def end(self) -> None:
-        """Take the bar away; a second call does nothing."""
+        """Remove the bar; safe to repeat."""
         self._console.end_panel()
 
 
@@ -55,12 +55,12 @@ def fitting(console: Console) -> Generator[ProgressLine]:
 
 
 def time_left(finished: int, left: int, elapsed: float) -> float | None:
-    """Return how long the rest takes [s] at the pace so far; None before there is one.
+    """Remaining time [s] at the speed so far; None if that is unknown.
 
     Args:
-        finished: how many were finished in `elapsed`.
-        left: how many are not done yet.
-        elapsed: time since the first began [s].
+        finished: number of items finished in `elapsed`.
+        left: number of remaining items.
+        elapsed: time since the start of the first [s].
     """
     if left == 0:
         return 0.0

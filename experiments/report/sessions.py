@@ -1,4 +1,4 @@
-"""From sessions to a report: the trials that are loaded, and their study."""
+"""Reports of recorded sessions: trials, study and page."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -33,17 +33,17 @@ from experiments.report.truth_errors import (
 )
 from experiments.session.store import FOLDS, SessionFolder
 
-_SHARE_OF_DISK = 4  # one part in so many of what is free may be results
+_SHARE_OF_DISK = 4  # results may take one part in so many of the free space
 
 
 def _load_trials(
     sessions: Sequence[SessionFolder], console: Console
 ) -> tuple[dict[str, list[ReducedTrial]], dict[Path, TruthErrors], list[str]]:
-    """Return kept trials by terrain, oldest session first; truths; what is left out."""
+    """Load kept trials by terrain, oldest session first; truths; omissions."""
     trials: dict[str, list[ReducedTrial]] = {}
     truths: dict[Path, TruthErrors] = {}
     left_out: list[str] = []
-    digests = TrialDigests()  # of what was recorded, whatever file it is in
+    digests = TrialDigests()  # of recordings, independent of files
     for session in sorted(sessions, key=lambda s: (s.path.name[:10], int(s.id[1:]))):
         for path in session.kept_trials():
             try:
@@ -72,13 +72,13 @@ def _load_trials(
 
 @dataclass(frozen=True, slots=True)
 class StudySession:
-    """Sessions and what a study makes of them.
+    """Study of sessions.
 
     Attributes:
-        study: the result.
+        study: the study.
         trials: the kept trials by terrain, in the matrix's order.
-        left_out: recordings that are not in it, and why.
-        truths: how far trials are from their truth files, by path of the trial.
+        left_out: omitted recordings, with reasons.
+        truths: errors against the truth files, by path of the trial.
     """
 
     study: Study
@@ -93,14 +93,14 @@ class StudySession:
 
     @property
     def doubts(self) -> list[str]:
-        """Why trials cannot be what they say they are, a line for each reason."""
+        """Doubts about the trials, one line per reason."""
         return doubt_summary(
             (t.name, t.doubts) for ts in self.trials.values() for t in ts
         )
 
 
 def results_below(data: Path) -> ResultStore:
-    """Return the store of results below a folder of data; it grows with the disk."""
+    """Return the result store of a data folder; its size depends on the free space."""
     free = disk_usage(data).free if data.is_dir() else 0
     return ResultStore(data / FOLDS, max(MOST_BYTES, free // _SHARE_OF_DISK))
 
@@ -112,7 +112,7 @@ def study_sessions(
     console: Console,
     fit: FitOptions,
 ) -> StudySession:
-    """Load the kept trials and fit; finished folds are kept below `kept`.
+    """Load the kept trials and fit; finished folds are stored in `kept`.
 
     Raises:
         SessionError: no session has a kept trial.
@@ -149,10 +149,10 @@ def report_sessions(
     request: ReportRequest,
     console: Console,
 ) -> Path:
-    """Load the kept trials, fit, and write the report; return the page.
+    """Load the kept trials, fit, and write the report; returns the page.
 
-    One session is reported into its own folder, several into `data`/study, all of them
-    into that of `request` where it names one.
+    The report goes to the folder of `request`, else to that of a single session, else
+    to `data`/study.
 
     Raises:
         SessionError: no session has a kept trial.
@@ -162,7 +162,7 @@ def report_sessions(
     own = sessions[0].path if len(sessions) == 1 else data / "study"
     out = request.out or own
     require_folder(out)
-    kept = request.out or data  # where results are kept for the next report
+    kept = request.out or data  # folder of the results, for the next report
     analysed = study_sessions(sessions, kept, request, console, request.fit)
     reported = _reported(sessions, request, analysed)
     store = results_below(kept)
@@ -176,7 +176,7 @@ def report_sessions(
 def _reported(
     sessions: Sequence[SessionFolder], request: ReportRequest, analysed: StudySession
 ) -> ReportedStudy:
-    """Return a study with what only its sessions can tell."""
+    """Return a study with the further tables and warnings of its sessions."""
     study, trials = analysed.study, analysed.trials
     every = [trial for group in trials.values() for trial in group]
     units = {

@@ -1,4 +1,4 @@
-"""The one place that makes a page: of a study of sessions, or of tables."""
+"""Report page of a study, of sessions or of tables."""
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -26,19 +26,19 @@ from experiments.session.store import iso_utc
 
 @dataclass(frozen=True, slots=True)
 class ReportedStudy:
-    """A study with what only the source of its trials can tell.
+    """A study with the data that depend on the source of its trials.
 
     Attributes:
         study: the study.
         title: heading of the page.
         subtitle: line below it.
-        is_foreign: the trials come from elsewhere, not from this rig.
-        trials: by terrain, for the same study under other choices.
-        with_columns: the same with the columns that are tested.
-        cells: the table of the cells of a matrix, where there are any.
+        is_foreign: whether the trials come from another rig.
+        trials: trials by terrain, for the study under other choices.
+        with_columns: the same with the columns to test.
+        cells: table of the cells of a matrix, if any.
         tables: further tables, each for its section.
         rig: health of the rig by trial.
-        warnings: shown first.
+        warnings: warnings at the top.
         numbers: further plain values for fits.json, by name.
     """
 
@@ -56,10 +56,10 @@ class ReportedStudy:
 
 
 def require_folder(out: Path) -> None:
-    """Make the folder of a report, before anything is fitted.
+    """Create the folder of a report, before anything is fitted.
 
     Raises:
-        SettingsError: it cannot be made, or written.
+        SettingsError: the folder cannot be created or written.
     """
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -87,15 +87,15 @@ def report_study(
     Args:
         reported: the study.
         out: folder of the report.
-        request: what is asked for beyond the study.
-        console: is told what is fitted.
+        request: options of the report.
+        console: output of progress.
         store: results of earlier runs; None = everything is computed.
 
     Raises:
         SettingsError: the folder cannot be written.
         MissingLibraryError: the extra `report` is not installed.
     """
-    from analysis.report.page import write_report  # exporting needs no page
+    from analysis.report.page import write_report  # slow, and not needed for exports
 
     study = reported.study
     variants = request.choices.variants
@@ -119,7 +119,7 @@ def report_study(
         rig=reported.rig,
         further_numbers={
             "what_if": [plain_choice(c, study, other) for c, other in others],
-            "covariates": [one.numbers() for one in tested],
+            "covariates": [result.numbers() for result in tested],
             **reported.numbers,
         },
         with_pdf=request.with_pdf,

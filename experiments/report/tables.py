@@ -29,10 +29,10 @@ _ROW = (
 
 
 def summary_table(study: Study) -> tuple[list[str], list[list[str]]]:
-    """Return header and rows of what a study comes to, a row per terrain.
+    """Return header and rows of the summary of a study, a row per terrain.
 
-    F_t/F_n: ratio of the means of a trial, mean over the trials and their standard
-    deviation. Errors: mean absolute error of trials left out [N].
+    F_t/F_n: ratio of the means of a trial, mean and standard deviation over the trials.
+    Errors: mean absolute error on held-out trials [N].
     """
     shown = (("Tustin", TUSTIN), ("GP", GP_SE))
     header = ["terrain", "trials", "F_t/F_n"]
@@ -170,7 +170,7 @@ def _provenance(trials: Sequence[ReducedTrial]) -> ReportTable:
 
 
 def _few(values: set[str]) -> str:
-    """Return the values in order; many, as of checksums per trial, are counted."""
+    """Return the values in order, or their count if there are many."""
     if len(values) <= 3:
         return " | ".join(sorted(values))
     return f"{len(values)} different values, in the trial files"
@@ -190,11 +190,11 @@ def _files(
 def cells_table(
     study: Study, units: Mapping[str, str] | None = None
 ) -> list[ReportTable]:
-    """Return the terrains with their factors; none where no factor was stated.
+    """Return the table of terrains with their factors; none without factors.
 
     Args:
         study: the study.
-        units: of the factors, by name.
+        units: units of the factors, by name.
     """
     results = list(study.terrains.values())
     names = dict.fromkeys(n for r in results for n in r.factors if n != FOOT)

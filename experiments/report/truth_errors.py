@@ -1,4 +1,4 @@
-"""What was measured beside what was true, in simulated trials."""
+"""Errors of simulated trials against their truth."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -21,21 +21,21 @@ from analysis.report.section import ReportSection, ReportTable
 from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
 
-_FEWEST = 50  # cycles, or a truth file is none of this trial
-_WIDTH = 11  # of the moving average, as the models see the trial
-_PREFIX = "true:"  # of the parameters in a truth file
+_FEWEST = 50  # common cycles, or the truth file is of another trial
+_WIDTH = 11  # samples of the moving average, as for the models
+_PREFIX = "true:"  # prefix of the parameters in a truth file
 
 
 @dataclass(frozen=True, slots=True)
 class TruthErrors:
-    """Errors of one trial after the same smoothing on both.
+    """Errors of one trial, after the same smoothing of measurement and truth.
 
     Attributes:
-        v_t: root mean square [m/s].
-        F_t: mean absolute [N].
-        F_n: mean absolute [N].
+        v_t: root mean square error [m/s].
+        F_t: mean absolute error [N].
+        F_n: mean absolute error [N].
         means: signed mean errors of F_t and F_n over the trial [N].
-        parameters: of the simulated ground that were in force [SI], by name.
+        parameters: true parameters of the simulated ground [SI], by name.
     """
 
     v_t: float
@@ -46,7 +46,7 @@ class TruthErrors:
 
 
 def compare_with_truth(trial: RecordedTrial) -> TruthErrors | None:
-    """Return how far a trial is from its truth file; None where there is none."""
+    """Return the errors of a trial against its truth file; None without one."""
     path = trial.path.with_name(trial.path.stem + ".truth.mcap")
     if not path.exists():
         return None
@@ -74,7 +74,7 @@ def compare_with_truth(trial: RecordedTrial) -> TruthErrors | None:
 
 
 def _parameters(metadata: Mapping[str, str]) -> dict[str, float]:
-    """Return the true parameters in a trial's metadata; other texts are left out."""
+    """Return the true parameters in a trial's metadata."""
     parameters: dict[str, float] = {}
     for key, text in metadata.items():
         if key.startswith(_PREFIX):
@@ -103,12 +103,12 @@ def truth_tables(
     trials: Mapping[str, Sequence[ReducedTrial]],
     truths: Mapping[Path, TruthErrors],
 ) -> list[ReportTable]:
-    """Return measured and recovered beside the truth; none without truth files.
+    """Return tables of measured and recovered values against the truth, if known.
 
     Args:
-        study: what was recovered.
-        trials: by terrain.
-        truths: how far trials are from their truth files, by path of the trial.
+        study: study with the recovered parameters.
+        trials: trials by terrain.
+        truths: errors against the truth files, by path of the trial.
     """
     errors = {
         name: [(t.name, truths[t.path]) for t in group if t.path in truths]
@@ -122,21 +122,21 @@ def truth_tables(
 
 
 def z_scores(trials: Sequence[RecordedTrial]) -> NDArray[np.float64]:
-    """Return the errors of mean F_t and F_n over their standard uncertainty.
+    """Errors of mean F_t and F_n divided by their standard uncertainty, shape (n, 2).
 
-    One row per trial that has a truth file and a session with two tares, shape (n, 2).
+    One row per trial with a truth file in a session with two tares.
     """
-    found = {trial.path: compare_with_truth(trial) for trial in trials}
+    truths = {trial.path: compare_with_truth(trial) for trial in trials}
     return _scores(
-        trials, {path: errors for path, errors in found.items() if errors is not None}
+        trials, {path: errors for path, errors in truths.items() if errors is not None}
     )
 
 
 def _scores(
     trials: Sequence[TaredTrial], truths: Mapping[Path, TruthErrors]
 ) -> NDArray[np.float64]:
-    known = uncertainties_of(trials)
-    pairs = [(uncertainty_of(t, known), truths.get(t.path)) for t in trials]
+    uncertainties = uncertainties_of(trials)
+    pairs = [(uncertainty_of(t, uncertainties), truths.get(t.path)) for t in trials]
     rows = [
         [mean / uncertainty.mean for mean in error.means]
         for uncertainty, error in pairs

@@ -1,4 +1,4 @@
-"""Whether a report still says what the data say, found without reading a trial."""
+"""Check whether a report is up to date, without reading a trial."""
 
 import hashlib
 import json
@@ -22,11 +22,11 @@ _LARGEST = 1 << 20  # bytes of a record
 
 @dataclass(frozen=True, slots=True)
 class ReportRecord:
-    """What a report was made from, kept beside the results of its study.
+    """Record of the inputs of a report, stored with the results of its study.
 
     Attributes:
         out: folder of the report.
-        path: of the record.
+        path: path of the record.
         inputs: digest of sessions, options, program and libraries.
     """
 
@@ -40,7 +40,7 @@ class ReportRecord:
         return self.out / _OUTPUTS[-1]
 
     def is_current(self) -> bool:
-        """Whether the report was made from the same, and its files are untouched.
+        """Whether the report has the same inputs and unchanged files.
 
         Files are compared by size and time of change; `traction verify` reads them.
         """
@@ -51,7 +51,7 @@ class ReportRecord:
         return self.page.is_file() and kept == self._content()
 
     def write(self) -> None:
-        """Keep the record of the report that was just made, where that is possible."""
+        """Write the record of a new report, if possible."""
         with suppress(OSError, ValueError):
             write_atomic(self.path, json.dumps(self._content()).encode())
 
@@ -63,13 +63,13 @@ class ReportRecord:
 def record_of(
     sessions: Sequence[SessionFolder], kept: Path, out: Path, options: object
 ) -> ReportRecord:
-    """Return the record of a report of `sessions` as they are now.
+    """Return the record of a report of `sessions` in their present state.
 
     Args:
-        sessions: what is reported.
-        kept: folder below which results are kept.
+        sessions: the reported sessions.
+        kept: folder of the stored results.
         out: folder of the report.
-        options: whatever else the report follows from; its text is compared.
+        options: all other inputs of the report, compared as text.
     """
     digest = hashlib.sha256(f"{_program()} {options!r}".encode())
     for session in sessions:
@@ -81,7 +81,7 @@ def record_of(
 
 
 def _recorded_files(folder: Path) -> Iterable[Path]:
-    """Yield the files of a session, those of its own report apart."""
+    """Yield the files of a session, except those of its report."""
     for path in sorted(folder.rglob("*")):
         top = path.relative_to(folder).parts[0]
         if top in {"report", "figures", "fits.json", "fits.csv"} or top[0] == ".":
@@ -91,7 +91,7 @@ def _recorded_files(folder: Path) -> Iterable[Path]:
 
 
 def _stamp(path: Path) -> list[int]:
-    """Return size [bytes] and times of change [ns] of a file; empty if it is gone."""
+    """Return size [bytes] and times of change [ns] of a file; empty if missing."""
     try:
         status = path.lstat()
     except OSError:

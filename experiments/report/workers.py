@@ -1,11 +1,11 @@
-"""Workers for fits and figures, which import while this process reads."""
+"""Workers for fits and figures, which import while this process reads trials."""
 
 from collections.abc import Generator
 from contextlib import contextmanager
 
 from analysis.study.worker_processes import end_workers, warm_workers
 
-_NEEDED = (  # by fits and figures, the first needed first
+_NEEDED = (  # modules of fits and figures, in order of use
     "analysis.study.study",
     "analysis.report.page",
     "scipy.signal",
@@ -17,11 +17,11 @@ _NEEDED = (  # by fits and figures, the first needed first
 
 @contextmanager
 def workers_of_report(*, are_needed: bool) -> Generator[None]:
-    """Start workers, first of all that a command does; end them with the block.
+    """Context of the workers, started before anything else and ended with the block.
 
     Args:
-        are_needed: there is work for them for certain; else they are started when
-            there is.
+        are_needed: whether there is certainly work; otherwise they are started on
+            demand.
     """
     try:
         if are_needed:

@@ -1,6 +1,6 @@
-"""The composition root: settings in, a rig out, real or simulated.
+"""Composition root: builds a real or simulated rig from settings.
 
 `rig` joins devices, loop and recorder; a backend runs them in this thread (stepped
-time) or in processes of their own; `fake` alone knows the simulated devices. Begin with
+time) or in separate processes; only `fake` imports the simulated devices. Begin with
 `rig`.
 """

@@ -1,8 +1,8 @@
-"""One program per arm and host: a lock that its owner's death opens.
+"""One program per arm and host: a file lock, released when its owner dies.
 
-A file for each interface and channel lies in a folder that every user of the machine
-may write to. It is never removed, so that all who wait for it mean the same file, and
-nothing in it is believed but the lock of the kernel: its words only name the owner.
+There is one file per interface and channel, in a folder that every user may write to.
+It is never removed, so that all programs lock the same file. Only the kernel's lock is
+trusted: the content merely names the owner.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from acquisition.files import UNFOLLOWED
 from experiments.messages import preflight_error
 
 FOLDERS = (Path("/run/lock"), Path("/var/lock"), Path("/var/tmp"), Path("/tmp"))
-_SHARED = stat.S_ISVTX | stat.S_IWOTH  # everybody may write, nobody removes another's
+_SHARED = stat.S_ISVTX | stat.S_IWOTH  # all may write, only owners remove
 _MODE = 0o666  # any user may be the next owner
 _LONGEST_NAME = 200
 _LONGEST_COMMAND = 120
@@ -36,10 +36,10 @@ _TRIES = 5
 
 @dataclass(frozen=True, slots=True)
 class ArmOwner:
-    """Who has an arm, as its process has written it; "?" where it has not.
+    """Owner of an arm, as written by its process; "?" = unknown.
 
     Attributes:
-        pid: number of the process.
+        pid: process id.
         command: its command line.
         since: time of day [UTC] at which it took the arm.
     """
@@ -50,7 +50,7 @@ class ArmOwner:
 
 
 class ArmLock:
-    """The right to open the bus of an arm, held until `close` or the owner's death."""
+    """Exclusive right to open the bus of an arm, until `close` or the owner's death."""
 
     def __init__(
         self, interface: str, channel: str, folders: Sequence[Path] = FOLDERS
@@ -60,12 +60,12 @@ class ArmLock:
         Args:
             interface: python-can's name of the adapter.
             channel: the adapter's name, or the path of a served bus.
-            folders: where the lock's file may be; the first one all may write to is.
+            folders: candidates for the folder of the lock's file, see `lock_folder`.
 
         Raises:
             PreflightError: another process has the arm, or the file cannot be used.
         """
-        import fcntl  # Linux has it; what has no arm starts without
+        import fcntl  # Linux only; other systems have no arm
 
         self.path = lock_folder(folders) / lock_name(interface, channel)
         self._descriptor = _open_safely(self.path)
@@ -87,14 +87,14 @@ class ArmLock:
         _write_owner(self._descriptor)
 
     def close(self) -> None:
-        """Let others have the arm; a second call does nothing."""
+        """Release the lock; safe to repeat."""
         if self._descriptor >= 0:
             os.close(self._descriptor)
             self._descriptor = -1
 
 
 def lock_folder(folders: Sequence[Path] = FOLDERS) -> Path:
-    """Return the first of `folders` that all users may write to, the same for all.
+    """Return the first of `folders` that all users may write to.
 
     Raises:
         PreflightError: there is none.
@@ -113,7 +113,7 @@ def lock_folder(folders: Sequence[Path] = FOLDERS) -> Path:
 
 
 def lock_name(interface: str, channel: str) -> str:
-    """Return the name of the lock's file; a path is one bus by whatever link."""
+    """Return the name of the lock's file; links to a path are resolved."""
     if interface == "traction-fake" or "/" in channel:
         channel = os.path.realpath(channel)
     name = quote(f"{interface}:{channel}", safe="")
@@ -123,13 +123,13 @@ def lock_name(interface: str, channel: str) -> str:
 
 
 def _open_safely(path: Path) -> int:
-    """Return a descriptor of the lock's file, made if it is not there.
+    """Open the lock's file, creating it if needed; returns its descriptor.
 
-    What is there may have been put there by any user: only a plain file with one name
-    is taken, no link is followed, and nothing is waited for.
+    An existing file may come from any user: only a regular file with one name is
+    accepted, without following links or blocking.
     """
     try:
-        descriptor = _open_or_make(path)
+        descriptor = _open_or_create(path)
     except OSError as error:
         raise _unusable(path, error.strerror or str(error)) from error
     fields = os.fstat(descriptor)
@@ -139,7 +139,7 @@ def _open_safely(path: Path) -> int:
     return descriptor
 
 
-def _open_or_make(path: Path) -> int:
+def _open_or_create(path: Path) -> int:
     for _ in range(_TRIES):
         try:
             return os.open(path, os.O_RDWR | UNFOLLOWED)
@@ -148,16 +148,16 @@ def _open_or_make(path: Path) -> int:
         except PermissionError:
             return os.open(path, os.O_RDONLY | UNFOLLOWED)  # enough for the lock
         try:
-            made = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | UNFOLLOWED, _MODE)
+            new = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | UNFOLLOWED, _MODE)
         except FileExistsError:
             continue  # another program was faster
-        os.fchmod(made, _MODE)  # whatever the umask is
-        return made
+        os.fchmod(new, _MODE)  # regardless of the umask
+        return new
     raise OSError("it comes and goes")
 
 
 def _write_owner(descriptor: int) -> None:
-    """Say who has the arm; another user's file may not let us, and is locked anyway."""
+    """Write the owner; failure is harmless: another user's file is locked anyway."""
     now = datetime.fromtimestamp(SystemClock().utc_ns() // NS_PER_S, UTC)
     command = shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])
     fields = {
@@ -173,7 +173,7 @@ def _write_owner(descriptor: int) -> None:
 
 
 def _read_owner(descriptor: int) -> ArmOwner:
-    """Return what the owner has written, without anything that is not printable."""
+    """Return the owner as written, printable characters only."""
     try:
         fields: object = json.loads(os.pread(descriptor, _MOST_BYTES, 0))
     except (OSError, ValueError, RecursionError):

@@ -1,7 +1,7 @@
-"""Arm and wrist sensor on one bus, as the console uses them while no loop runs.
+"""Operations on arm and wrist sensor while the loop does not run.
 
-Each operation is written once, here. A backend in this thread carries requests out on
-it; the process that drives the arm does the same with those that arrive.
+The in-process backend and the process that drives the arm both execute requests on an
+`ArmService`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -36,24 +36,24 @@ from wam.driver.arm import WamArm
 from wam.driver.startup import ArmInfo
 from wam.driver.survey import Answers, RestTraffic
 
-UNASKED_EVERY = 20  # in one of so many cycles they are not
-_AGE_CYCLES = 5  # at the end, in none of which they are
-_QUESTIONS = 3  # to each puck, how long one answer takes
+UNASKED_EVERY = 20  # one cycle in so many omits the position request
+_AGE_CYCLES = 5  # cycles without requests at the end
+_QUESTIONS = 3  # timed property requests to each puck
 _EXCHANGE_PERIODS = EXCHANGE_CYCLES + (EXCHANGE_CYCLES - 1) // (UNASKED_EVERY - 1)
 
 
 @dataclass(frozen=True, slots=True)
 class ArmAccess:
-    """How a thread comes by its devices.
+    """Functions by which a thread opens its devices.
 
     Attributes:
         open_bus: returns the arm's driver and its link, the bus open; raises LinkError.
-        check: raises PreflightError or LinkError where the arm is another program's;
-            nothing on a bus of one's own.
-        open_sensor: returns the wrist sensor, opened.
-        loop_config: returns what the loop is made of.
-        sensor: that another process opens, as the loop polls it; None = `open_sensor`
-            does.
+        check: raises PreflightError or LinkError if another program uses the arm; does
+            nothing on a private bus.
+        open_sensor: opens and returns the wrist sensor.
+        loop_config: returns the configuration of the loop.
+        sensor: sensor opened by another process, as the loop polls it; None =
+            `open_sensor` opens it.
     """
 
     open_bus: Callable[[], tuple[WamArm, CanLink]]
@@ -64,18 +64,18 @@ class ArmAccess:
 
 
 class ArmService:
-    """Carries requests out on the arm, whose bus is opened when it is first needed.
+    """Executes requests on the arm, whose bus is opened on first use.
 
     Attributes:
-        loop_server: the work of the loop that was asked for by `begin`; None = none.
+        loop_server: the work of the loop after `begin`, else None.
     """
 
     def __init__(self, access: ArmAccess, clock: Clock) -> None:
-        """Open nothing yet.
+        """Prepare the service without opening devices.
 
         Args:
-            access: how arm and sensor are opened.
-            clock: the time of the loop.
+            access: functions that open arm and sensor.
+            clock: clock of the loop.
         """
         self.loop_server: LoopServer | None = None
         self._access = access
@@ -84,7 +84,7 @@ class ArmService:
         self._sensor = access.sensor
 
     def handlers(self) -> Handlers:
-        """Return the table of what is answered here."""
+        """Return the handlers of all requests."""
         return {
             ClaimArm: self.claim,
             StartArm: self.start,
@@ -101,13 +101,13 @@ class ArmService:
 
     @property
     def arm(self) -> WamArm:
-        """Its driver, the bus open; raises LinkError."""
+        """The arm's driver, its bus open; raises LinkError."""
         return self._opened()[0]
 
     def claim(self) -> None:
         """See `ClaimArm`."""
         arm, link = self._opened()
-        if arm.sent_ns:  # it is this program's already
+        if arm.sent_ns:  # claimed already
             return
         try:
             self._access.check(arm, link)
@@ -134,13 +134,13 @@ class ArmService:
     def measure_exchange(self) -> ExchangeTimes:
         """See `MeasureExchange`.
 
-        Between them come cycles that do not ask: see `ExchangeTimes.late`.
+        Some cycles omit the request: see `ExchangeTimes.late`.
         """
         arm, clock = self.arm, self._clock
         answer_ns = arm.answer_time(_QUESTIONS)
         times: list[int] = []
         unasked = late = jumps = 0
-        is_judged = False  # complete, and nobody else asks: that is told by the loop
+        is_judged = False  # complete, and no other master on the bus
         for number, _ in enumerate(self._periods(_EXCHANGE_PERIODS), 1):
             is_without_request = number % UNASKED_EVERY == 0
             now_ns = clock.now_ns()
@@ -150,7 +150,7 @@ class ArmService:
                 jumps += reading.jump is not None
                 if reading.is_complete:
                     times.append(reading.arm_ns - reading.host_ns)
-            elif is_judged:  # a motor that owes an answer may still give it
+            elif is_judged:  # otherwise a reply may still be outstanding
                 unasked += 1
                 late += reading.late is not None
         ages = [0]
@@ -161,9 +161,9 @@ class ArmService:
         return ExchangeTimes(times, unasked, late, max(ages), answer_ns, jumps)
 
     def _periods(self, count: int) -> Iterator[int]:
-        """Yield at the beginning of each of `count` periods of the loop.
+        """Yield at the start of each of `count` periods of the loop.
 
-        The sensor is read between them, or its buffer would overflow.
+        The sensor is polled in between, or its buffer would overflow.
         """
         clock = self._clock
         next_ns = clock.now_ns() + PERIOD_NS
@@ -184,7 +184,7 @@ class ArmService:
         return self._sensor.describe()
 
     def stream_metadata(self) -> dict[str, str]:
-        """Return what became of the sensor's samples since it was opened, as text."""
+        """Return counters of the sensor's stream since it was opened, as text."""
         return {} if self._sensor is None else self._sensor.stream_metadata()
 
     def begin(self) -> None:
@@ -203,7 +203,7 @@ class ArmService:
         return self.arm.safety_mode()
 
     def release(self) -> None:
-        """Idle the arm if it got torques from here, and give the bus back."""
+        """Idle the arm if this program sent torques, and close the bus."""
         if self._devices is not None:
             release(*self._devices)
         self._devices = None

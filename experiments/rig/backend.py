@@ -1,4 +1,4 @@
-"""The interface between the console and the devices, in this process or in others."""
+"""Interface between console and devices, in this process or in others."""
 
 import os
 from contextlib import suppress
@@ -27,55 +27,55 @@ class RigBackend(Protocol):
 
     @property
     def recorder(self) -> TrialRecording:
-        """What writes the trials."""
+        """The recorder of trials."""
         ...
 
     @property
     def recorder_pid(self) -> int:
-        """Number of the process that writes them."""
+        """Process id of the recorder."""
         ...
 
     def ask(self, request: Request[Answer]) -> Answer:
-        """Return the answer of arm or sensor to one of `experiments.rig.requests`.
+        """Send a request of `experiments.rig.requests` to arm or sensor.
 
-        For the time in which the loop does not run; raises what the request says.
+        Only while the loop does not run; raises the errors of the request.
         """
         ...
 
     def sensor_metadata(self) -> dict[str, str]:
-        """Return what became of the sensor's samples since it was opened, as text."""
+        """Return counters of the sensor's stream since it was opened, as text."""
         ...
 
     def begin(self) -> None:
-        """Let the loop run from here on."""
+        """Start the loop."""
         ...
 
     def grants(self) -> dict[str, list[Grant]]:
-        """Return what the kernel granted to each process."""
+        """Return the scheduling rights granted to each process."""
         ...
 
     def idle(self) -> bool:
-        """Idle the arm whatever has happened; return whether that is confirmed."""
+        """Idle the arm in any state; returns whether that is confirmed."""
         ...
 
     def safety_mode(self) -> SafetyMode:
-        """Return the safety module's newest mode."""
+        """Return the latest mode of the safety module."""
         ...
 
     def close(self) -> None:
-        """Idle the arm if it got torques, and end everything; safe to repeat."""
+        """Idle the arm if torques were sent, and end all processes; safe to repeat."""
         ...
 
 
-_GATHERED = 130  # cycles that the recorder in this thread writes at once, 0.26 s
+_GATHERED = 130  # cycles per drain of the recorder in this thread, 0.26 s
 
 
 class InlineAdvance:
-    """Loop and recorder in this thread: nothing runs unless the console waits.
+    """Loop and recorder in this thread: both run only while the console waits.
 
-    The recorder drains as often as it would flush anyway: a process of its own drains
-    every 20 ms, but here one long piece of work costs half of many short ones, and it
-    is the simulation that waits for it.
+    The recorder drains as often as it flushes: a separate process drains every 20 ms,
+    but here one long drain costs half of many short ones, and the simulation waits for
+    it.
     """
 
     def __init__(self, loop: Loop, recorder: Recorder) -> None:
@@ -84,11 +84,11 @@ class InlineAdvance:
         self._passed = 0
 
     def step(self) -> None:
-        """Run one cycle, whatever has become of the recorder."""
+        """Run one cycle, even if the recorder has failed."""
         self._loop.step()
 
     def __call__(self, cycles: int) -> None:
-        """Run the loop for `cycles` periods; drain the recorder when it is time."""
+        """Run the loop for `cycles` periods; drain the recorder when due."""
         self._loop.run(cycles)
         self._passed += cycles
         if self._passed >= _GATHERED:
@@ -112,19 +112,19 @@ class InProcessBackend:
 
     @property
     def recorder_pid(self) -> int:
-        """Number of this process, which writes the trials too."""
+        """Id of this process, which also writes the trials."""
         return os.getpid()
 
     def ask(self, request: Request[Answer]) -> Answer:
-        """Return the answer of arm or sensor; see `experiments.rig.requests`."""
+        """Execute a request of `experiments.rig.requests`."""
         return self._dispatcher.carry_out(request)
 
     def sensor_metadata(self) -> dict[str, str]:
-        """Return what became of the sensor's samples since it was opened, as text."""
+        """Return counters of the sensor's stream since it was opened, as text."""
         return self._service.stream_metadata()
 
     def begin(self) -> None:
-        """Let the loop run from here on, whenever the console waits."""
+        """Start the loop, which runs whenever the console waits."""
         self._service.begin()
         loop_server = self._service.loop_server
         assert loop_server is not None
@@ -133,34 +133,35 @@ class InProcessBackend:
         self.loop_client.beat()
 
     def grants(self) -> dict[str, list[Grant]]:
-        """Return nothing: this thread asks for nothing."""
+        """Return no grants: this thread requests none."""
         return {}
 
     def idle(self) -> bool:
-        """Idle the arm; return whether that is confirmed.
+        """Idle the arm; returns whether that is confirmed.
 
-        A loop that runs is asked for it: an arm idled behind its back would look as if
+        A running loop does it itself: to the loop, an arm idled by others would look as
+            if
         the pendant had been pressed.
         """
         if self._advance_loop is not None:
-            with suppress(Exception):  # of a loop that fails the arm is taken away
+            with suppress(Exception):  # of a failed loop: the arm is idled directly
                 self.loop_client.request(ArmState.IDLE)
                 self._advance_loop.step()
                 return self.loop_client.status.state is ArmState.IDLE
         return self._service.idle()
 
     def safety_mode(self) -> SafetyMode:
-        """Return the safety module's newest mode."""
+        """Return the latest mode of the safety module."""
         return self._service.safety_mode()
 
     def close(self) -> None:
-        """Idle the arm if it got torques, give bus and port back; safe to repeat."""
+        """Idle the arm if torques were sent, close bus and port; safe to repeat."""
         self.recorder.abandon()
         self._service.close()
         self._shared.close()
 
     def _advance(self, cycles: int) -> None:
-        """Let `cycles` periods of the loop pass."""
+        """Run `cycles` periods of the loop."""
         if self._advance_loop is None:
             raise RuntimeError("the loop does not run yet")
         self._advance_loop(cycles)

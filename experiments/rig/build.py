@@ -1,4 +1,4 @@
-"""Settings in, parts of a rig out: tool, limits, arm, sensor, the work of a cycle."""
+"""Build the parts of a rig from settings: tool, limits, arm, sensor, cycle."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ from wam.model.constants import ArmConstants, Array, Body
 from wam.model.start_pose import elbow_up, lowered_to
 from wam.model.tool import Tool, sensor_body
 
-LOST_POSITIONS = "positions-lost.txt"  # beside rig.toml
+LOST_POSITIONS = "positions-lost.txt"  # in the folder of rig.toml
 
 
 def terrain_frame(row: TerrainRow) -> TerrainFrame:
-    """Return the frame of the push across a row of the matrix.
+    """Return the terrain frame of a row of the matrix.
 
-    That of its container; of a push away from the base, the same seen from its other
-    end: trials start at the near end, and what was downhill is uphill.
+    That of its container; for a push away from the base the same seen from its other
+    end: trials start at the near end, and downhill becomes uphill.
     """
     frame = TerrainFrame(
         incline=float(np.radians(row.incline_deg)),
@@ -62,14 +62,14 @@ def terrain_frame(row: TerrainRow) -> TerrainFrame:
 
 
 def start_of(row: TerrainRow, model: ArmModel) -> Array:
-    """Return joints with the foot where trials start: as stated, or computed [rad].
+    """Joint positions with the foot at the start of a trial [rad], stated or computed.
 
     Args:
-        row: of the matrix.
+        row: row of the matrix.
         model: the arm with its tool.
 
     Raises:
-        SettingsError: the arm does not reach it.
+        SettingsError: the start is out of reach.
     """
     frame = terrain_frame(row)
     start, axes = np.array(frame.far_end), frame.axes()
@@ -138,15 +138,15 @@ def build_safety_limits(rig: RigSettings) -> SafetyLimits:
 
 
 def build_link(transport: Transport, shared: SharedLayout, clock: Clock) -> CanLink:
-    """Return the link over a transport; every frame goes into the shared memory too."""
+    """Return the link over a transport; frames are copied to the shared memory."""
     return CanLink(transport, FrameRing(shared.frames, clock).add)
 
 
 def read_properties(settings: Settings) -> str:
-    """Return the text of what this arm's pucks say of themselves, "" for a factory's.
+    """Return the property table of this arm's pucks as text, "" for the factory's.
 
     Raises:
-        SettingsError: the file that rig.toml names cannot be read or is no such table.
+        SettingsError: the file named in rig.toml cannot be read or is no such table.
     """
     name = settings.rig.arm.properties
     if name is None:
@@ -177,11 +177,11 @@ def build_arm(
 
     Args:
         rig: settings of the rig.
-        constants: of the arm.
+        constants: constants of the arm.
         link: its bus.
-        clock: the time of the loop.
-        properties: what its pucks say of themselves, "" for a factory's.
-        lost: file that notes positions that were lost; None = none is kept.
+        clock: clock of the loop.
+        properties: property table of its pucks, "" for the factory's.
+        lost: file that records lost positions; None = not recorded.
     """
     settings = ArmSettings(
         j2mp=constants.j2mp,
@@ -193,11 +193,11 @@ def build_arm(
 
 
 def open_bus_sensor(arm: WamArm, link: CanLink, clock: Clock) -> BarrettSensor:
-    """Open the wrist sensor on the arm's bus; it is asked along from then on.
+    """Open the wrist sensor on the arm's bus; the arm polls it from then on.
 
     Raises:
-        LinkError: it is silent.
-        DeviceFaultError: it is not well.
+        LinkError: the sensor is silent.
+        DeviceFaultError: the sensor reports a fault.
     """
     sensor = BarrettSensor(link, clock)
     sensor.open()
@@ -223,12 +223,12 @@ def build_sensor(
 
 @dataclass(frozen=True, slots=True)
 class LawParts:
-    """What the control law is made of, as far as it was calibrated.
+    """Models of the control law, calibrated as far as available.
 
     Attributes:
-        model: the arm with its tool, for everything but its weight.
-        weighed: the arm as the control law weighs it.
-        compensation: of friction; None = none.
+        model: the arm with its tool, for everything but gravity.
+        weighed: gravity model of the control law.
+        compensation: friction compensation; None = none.
     """
 
     model: ArmModel
@@ -238,7 +238,7 @@ class LawParts:
 
 @dataclass(frozen=True, slots=True)
 class LoopConfig:
-    """What a loop is made of.
+    """Configuration of a loop.
 
     Attributes:
         rig: rig.toml.
@@ -247,9 +247,9 @@ class LoopConfig:
         arm: driver of the arm.
         sensor: the wrist sensor as the loop polls it.
         shared: the memory that the processes share.
-        clock: the loop's time.
-        is_simulated: the devices are simulated.
-        sound: sounds a bell for a person.
+        clock: the loop's clock.
+        is_simulated: whether the devices are simulated.
+        sound: rings the bell of the console.
     """
 
     rig: RigSettings
@@ -264,14 +264,14 @@ class LoopConfig:
 
 
 def build_loop_server(parts: LoopConfig) -> LoopServer:
-    """Join arm, sensor, law and guard into a cycle that is ready to run."""
+    """Join arm, sensor, law and guard into a runnable cycle."""
     control, shared = parts.rig.control, parts.shared
     model = parts.law.model
     assert model.tool is not None
     is_shared = isinstance(parts.sensor, SharedSensor)
 
     def on_wrench(samples: list[WrenchSample]) -> None:
-        if not is_shared:  # those of a shared sensor are in the shared memory already
+        if not is_shared:  # a shared sensor publishes by itself
             publish(samples, shared.wrenches)
 
     def metadata() -> dict[str, str]:
@@ -304,5 +304,5 @@ def build_loop_server(parts: LoopConfig) -> LoopServer:
             extra_flags=Flag.SIMULATED if parts.is_simulated else 0,
         ),
     )
-    around = LoopHooks(parts.clock.now_ns, metadata, parts.sound)
-    return LoopServer(cycle, parts.arm, shared, around)
+    hooks = LoopHooks(parts.clock.now_ns, metadata, parts.sound)
+    return LoopServer(cycle, parts.arm, shared, hooks)

@@ -15,17 +15,17 @@ from wam.bus.log import CanLog
 if TYPE_CHECKING:
     from experiments.rig.rig import Rig
 
-_BUFFER = 1 << 20  # bytes; the loop meets the file system every few seconds only
+_BUFFER = 1 << 20  # bytes, so that a write to the disk is rare
 
 
 @contextmanager
 def open_bus_log(
     path: Path | None, clock: Clock, channel: str, console: Console
 ) -> Generator[CanLog | None]:
-    """Give the log that is to be written to `path`, None if there is none.
+    """Open the log at `path`; yields None if there is no path.
 
     Raises:
-        SettingsError: the file cannot be made, or holds something already.
+        SettingsError: the file cannot be created, or is not empty.
     """
     if path is None:
         yield None
@@ -58,7 +58,7 @@ def open_bus_log(
 
 @contextmanager
 def logging_bus(rig: Rig, path: Path | None, console: Console) -> Generator[None]:
-    """Write the bus of `rig` to `path` while this lasts; at the end the rig is closed.
+    """Log the bus of `rig` to `path`; closes the rig at the end.
 
     Raises:
         SettingsError: as `open_bus_log`.
@@ -73,7 +73,7 @@ def logging_bus(rig: Rig, path: Path | None, console: Console) -> Generator[None
             log.add(int(frame["can_id"]), data, int(frame["t_ns"]))
 
     with (
-        closing(rig.backend),  # closed even where the log cannot be opened
+        closing(rig.backend),  # closed even if the log cannot be opened
         open_bus_log(path, rig.clock, channel, console) as log,
     ):
         if log is not None:
@@ -81,7 +81,7 @@ def logging_bus(rig: Rig, path: Path | None, console: Console) -> Generator[None
         try:
             yield
         finally:
-            rig.backend.close()  # what the arm says in parting is logged
+            rig.backend.close()  # its last frames are logged
             if log is not None:
                 drain(log)
             if reader.lost:

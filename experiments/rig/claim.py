@@ -1,6 +1,6 @@
-"""Before the first frame: is the bus free of other masters, is the arm at rest?
+"""Claim of an arm: no other master on the bus, arm inactive; and its release.
 
-And at the end: an arm that never got a torque is left as it is.
+An arm that never received a torque is released unchanged.
 """
 
 from acquisition.clock import Clock
@@ -11,17 +11,17 @@ from wam.bus.link import CanLink
 from wam.driver.arm import WamArm
 
 LISTEN_NS = 50_000_000  # 25 cycles of another master at 500 Hz
-_QUESTIONS = 3  # a lost answer must not let the start-up write to an active arm
-_LOOK_NS = 5_000_000  # between two looks, so that no buffer of a socket overflows
+_QUESTIONS = 3  # a lost reply must not let the start-up write to an active arm
+_LOOK_NS = 5_000_000  # polling period, so that no socket buffer overflows
 
 
 def check_alone(link: CanLink, clock: Clock, bus: str) -> None:
     """Listen for 50 ms without sending anything.
 
     Args:
-        link: to the bus.
-        clock: the time to listen by.
-        bus: what it is called in the message.
+        link: link to the bus.
+        clock: clock of the listening time.
+        bus: name of the bus in the message.
 
     Raises:
         PreflightError: another master talks.
@@ -37,9 +37,9 @@ def check_alone(link: CanLink, clock: Clock, bus: str) -> None:
 
 
 def check_inactive(arm: WamArm) -> None:
-    """Ask the safety module for its mode, three times at most, and nothing else.
+    """Read only the mode of the safety module, three times at most.
 
-    Silence is left to the start-up, which says more about it.
+    Silence is left to the start-up, whose message is more precise.
 
     Raises:
         PreflightError: the arm is active.
@@ -56,9 +56,9 @@ def check_inactive(arm: WamArm) -> None:
 
 
 def release(arm: WamArm, link: CanLink) -> None:
-    """Idle an arm that got torques from here, and give the bus back.
+    """Idle an arm that received torques from this program, and close the bus.
 
-    Any other arm is left as it is: another program may hold it.
+    Any other arm is left unchanged: another program may hold it.
     """
     if arm.sent_ns:
         arm.close()

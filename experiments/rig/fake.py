@@ -1,4 +1,4 @@
-"""The simulated world under a session: its settings, and how it is stepped."""
+"""Simulated rigs: their settings, stepped simulation, and served arms."""
 
 from __future__ import annotations
 
@@ -44,13 +44,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class RigTruth:
-    """What is true of a simulated rig, but not believed.
+    """True deviations of a simulated rig from its settings.
 
     Attributes:
-        spread: it is one of many sound rigs, drawn by the seed: zeros, stops, mounting
-            and sensor are nearly those of the drawings.
-        mount: turns of its base about x, then y, then z [degrees].
-        wrong: name of what is wrong with it in the catalogue; "" = nothing.
+        spread: whether the rig is drawn from the population of sound ones, by the seed:
+            zeros, stops, mounting and sensor are nearly those of the drawings.
+        mount: rotations of its base about x, then y, then z [degrees].
+        wrong: name of its defect in the catalogue; "" = none.
     """
 
     spread: bool = False
@@ -60,16 +60,16 @@ class RigTruth:
 
 @dataclass(frozen=True, slots=True)
 class SimulatedRig:
-    """What is simulated: the settings as written, before any calibration.
+    """Settings of a simulation, before any calibration.
 
     Attributes:
         rig: rig.toml.
         row: row of the matrix.
-        seed: of everything random.
-        friction: of the joints, as a share of what was identified on another arm.
-        pace: how the simulated person pushes.
-        cables: resonance of the joints on their cables [Hz]; None = stiff ones.
-        truth: what is true of the rig, but not believed; None = nothing.
+        seed: seed of all random numbers.
+        friction: joint friction as a share of that identified on another arm.
+        pace: style of the simulated person's push.
+        cables: resonance of the joints on their cables [Hz]; None = stiff cables.
+        truth: true deviations of the rig; None = none.
     """
 
     rig: RigSettings
@@ -81,7 +81,7 @@ class SimulatedRig:
     truth: RigTruth | None = None
 
     def metadata(self) -> dict[str, Any]:
-        """Return the world in plain values, for a process of its own."""
+        """Return the simulation as plain values, for another process."""
         row, tool = self.row, build_tool(self.rig, self.row.foot)
         frame, sole = terrain_frame(row), self.rig.feet[row.foot].simulate
         start = start_of(row, ArmModel(load_constants(), tool))
@@ -112,18 +112,18 @@ class SimulatedRig:
 
 
 def wrong_rigs() -> dict[str, str]:
-    """Return what is wrong with each rig of the catalogue and why, by its name."""
+    """Return defect and cause of each wrong rig of the catalogue, by name."""
     from fakes.world.wrong_rigs import catalogue
 
     return {name: f"{rig.wrong} ({rig.cause})" for name, rig in catalogue().items()}
 
 
 def typed_wrongly(settings: Settings, wrong: str) -> Settings:
-    """Return the settings as they are with the wrong rig of that name.
+    """Return the settings of the wrong rig of that name, with its typing error.
 
     Raises:
-        SettingsError: there is no such rig, or rig.toml would be refused with what is
-            typed into it.
+        SettingsError: there is no such rig, or rig.toml would be refused with the
+            typing error.
     """
     from fakes.world.wrong_rigs import wrong_rig
 
@@ -132,7 +132,7 @@ def typed_wrongly(settings: Settings, wrong: str) -> Settings:
 
 
 def sensor_metadata(section: AnySensor) -> dict[str, Any]:
-    """Return which simulated sensor fits the settings, in plain values."""
+    """Return the options of the simulated sensor as plain values."""
     options = {"kind", "sinc", "baudrate", "sensitivity", "serial_number", "rate"}
     options |= {"counts_per_force", "counts_per_torque"}
     return section.model_dump(include=options)
@@ -177,7 +177,7 @@ def stepped(
 
     access = ArmAccess(
         open_bus=lambda: (arm, link),
-        check=lambda arm, link: None,  # the bus is its own
+        check=lambda arm, link: None,  # private bus
         open_sensor=opened_sensor,
         loop_config=loop_config,
     )
@@ -192,7 +192,7 @@ def _opened_sensor(rig: RigSettings, port: SerialPort, clock: Clock) -> SerialSe
 
 
 def _sensor_line(settings: Settings, path: Path, kind: str) -> SensorLine:
-    """Return a serial sensor of `kind` at `path`, as rig.toml has it if it fits."""
+    """Return a serial sensor of `kind` at `path`, with rig.toml's options."""
     from fakes.sensor.kinds import SensorChoice
     from fakes.serving.sensor_server import SensorLine
 
@@ -208,20 +208,21 @@ NO_TOOL = "none"
 
 @dataclass(frozen=True, slots=True)
 class ServedArm:
-    """What is served to other programs.
+    """Options of an arm served to other programs.
 
     Attributes:
         bus: "traction-fake" or an interface of python-can, and its channel.
         line: path and kind of a serial sensor; None = the sensor is on the bus.
-        is_idle_first: the arm begins powered, idle, pucks asleep; otherwise in E-STOP.
+        is_idle_first: whether the arm starts powered, idle, pucks asleep; otherwise in
+            E-STOP.
         tool: a foot of rig.toml, "none", or the path of a foot's file; empty for the
             foot of the first terrain.
-        has_hand: a person carries the arm.
-        firmware: of the motor pucks, and of the safety module.
-        is_at_rest: the arm is at home with joint 6 on its upper stop, not just at home.
-        friction: of the joints, as a share; None = what fits `has_hand`.
-        seed: of the sound arm that it is; None = that of the drawings.
-        truth: what is true of the arm, but not believed; None = nothing.
+        has_hand: whether a simulated person carries the arm.
+        firmware: versions of motor pucks and safety module.
+        is_at_rest: whether joint 6 lies on its upper stop, the others at home.
+        friction: share of joint friction; None = default for `has_hand`.
+        seed: seed of a sound arm; None = that of the drawings.
+        truth: true deviations of the arm; None = none.
     """
 
     bus: tuple[str, str]
@@ -237,10 +238,10 @@ class ServedArm:
 
 
 def _served_tool(settings: Settings, tool: str) -> Tool | None:
-    """Return what hangs on the plate; `tool` as in `ServedArm`.
+    """Return the tool on the plate; `tool` as in `ServedArm`.
 
     Raises:
-        SettingsError: its file cannot be read or is wrong.
+        SettingsError: its file cannot be read or is invalid.
     """
     if tool == NO_TOOL:
         return None
@@ -253,24 +254,24 @@ def _served_tool(settings: Settings, tool: str) -> Tool | None:
 def build_sensor_server(
     settings: Settings, line: tuple[Path, str], tool: str
 ) -> SensorServer:
-    """Return a serial sensor alone, below which a foot hangs.
+    """Return a served serial sensor without arm, carrying a foot.
 
     Args:
         settings: all settings.
-        line: the path it is served at, and its kind.
+        line: path and kind of the sensor.
         tool: as in `ServedArm`.
 
     Raises:
-        SettingsError: the path is in use or cannot be one, or there is no tool.
+        SettingsError: the path is in use or invalid, or there is no tool.
     """
     from fakes.serving.sensor_server import SensorServer, hanging_load
 
-    hanging = _with_sensor(_served_tool(settings, tool))
+    hanging = _require_tool(_served_tool(settings, tool))
     served = _sensor_line(settings, *line)
     return SensorServer(served, hanging_load(hanging), SystemClock())
 
 
-def _with_sensor(tool: Tool | None) -> Tool:
+def _require_tool(tool: Tool | None) -> Tool:
     if tool is None:
         raise SettingsError(
             "Without a tool there is no wrist sensor to serve.",
@@ -282,11 +283,10 @@ def _with_sensor(tool: Tool | None) -> Tool:
 def build_server(settings: Settings, served: ServedArm) -> PuckServer:
     """Return a simulated arm that serves its pucks to other programs.
 
-    The arm is at its home position, where an operator puts it before zeroing.
+    The arm is at its home position, as before zeroing.
 
     Raises:
-        SettingsError: the socket's path is in use or cannot be one, or the tool is
-            wrong.
+        SettingsError: the socket's path is in use or invalid, or the tool is wrong.
         LinkError: the bus cannot be opened.
     """
     from fakes.serving.home_arm import HomePose, build_home_server
@@ -296,7 +296,7 @@ def build_server(settings: Settings, served: ServedArm) -> PuckServer:
     truth = None if served.truth is None else asdict(served.truth)
     tool, line = _served_tool(settings, served.tool), None
     if served.line is not None:
-        _with_sensor(tool)
+        _require_tool(tool)
         line = _sensor_line(settings, *served.line)
     home = HomePose(
         tool,

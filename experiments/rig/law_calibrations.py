@@ -1,4 +1,4 @@
-"""What floats the arm: [gravity] and [friction] of rig.toml, the files behind them."""
+"""Calibrations of the control law: [gravity] and [friction] of rig.toml, and files."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ from wam.model.gravity import gravity_model
 
 _INSTEAD = 'set [gravity] model = "cad" in rig.toml'
 _WITHOUT = 'set [friction] model = "none" in rig.toml'
-_LARGEST = 2.5  # of what was identified on another arm
+_LARGEST = 2.5  # multiple of the friction identified on another arm
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,9 +41,8 @@ class LawCalibrations:
     """Texts of the calibrations in use.
 
     Attributes:
-        gravity: of the gravity calibration; "" for none.
-        friction: of the friction calibration, whether it is compensated or not; "" for
-            none.
+        gravity: text of the gravity calibration; "" for none.
+        friction: text of the friction calibration, compensated or not; "" for none.
     """
 
     gravity: str = ""
@@ -56,22 +55,24 @@ class LawCalibrations:
 
 
 def gravity_path(settings: Settings) -> Path:
-    """Return where rig.toml has its gravity calibration, from its own folder."""
+    """Return the path of the gravity calibration."""
     return settings.folder / settings.rig.gravity.file
 
 
 def friction_path(settings: Settings) -> Path:
-    """Return where rig.toml has its friction calibration, from its own folder."""
+    """Return the path of the friction calibration."""
     return settings.folder / settings.rig.friction.file
 
 
 def read_law_calibrations(settings: Settings) -> LawCalibrations:
-    """Return the texts of the calibrations that rig.toml chooses.
+    """Read the calibrations that rig.toml selects.
 
-    A calibration of friction that is not chosen tells what the rig can do without it.
+    A friction calibration that is not selected is read too, if present: its
+        uncompensated
+    friction is recorded.
 
     Raises:
-        SettingsError: one cannot be read.
+        SettingsError: a selected file cannot be read.
     """
     gravity = friction = ""
     if settings.rig.gravity.model == "calibrated":
@@ -84,7 +85,7 @@ def read_law_calibrations(settings: Settings) -> LawCalibrations:
 
 
 def _text_of(path: Path) -> str:
-    """Return the text of a file that may be there, "" where it cannot be read."""
+    """Return the text of an optional file, "" if it cannot be read."""
     with suppress(OSError, ValueError):
         return read_text(path)
     return ""
@@ -93,16 +94,16 @@ def _text_of(path: Path) -> str:
 def build_law_model(
     rig: RigSettings, gravity_text: str, foot: str, *, is_simulated: bool
 ) -> ArmModel:
-    """Return the arm with `foot` on it as the control law weighs it.
+    """Return the gravity model of the control law, with `foot`.
 
-    A calibration contains the foot that was on. For another foot of rig.toml it is
-    corrected by the difference of the two. A foot or sensor whose numbers have changed
-    since is none that was fitted: which of them is wrong is not observable, so it is
-    refused.
+    A calibration includes the foot that was mounted; for another foot of rig.toml it is
+    corrected by the difference of both. If the numbers of the calibrated foot or sensor
+    have changed since, the calibration is refused: which number is wrong is not
+    observable.
 
     Raises:
-        SettingsError: the calibration is none, was made with another tool, or with a
-            simulated arm for a real one or conversely.
+        SettingsError: the calibration is invalid, was made with another tool, or with a
+            simulated arm for a real one or vice versa.
     """
     constants, tool = load_constants(), build_tool(rig, foot)
     if rig.gravity.model == "cad":
@@ -133,8 +134,8 @@ def build_law(
     """Return models and compensation of the control law with `foot` on the arm.
 
     Raises:
-        SettingsError: a calibration is none, was made with another tool or gravity, or
-            with a simulated arm for a real one or conversely.
+        SettingsError: a calibration is invalid, was made with another tool or gravity,
+            or with a simulated arm for a real one or vice versa.
     """
     return LawParts(
         ArmModel(load_constants(), build_tool(rig, foot)),
@@ -146,11 +147,11 @@ def build_law(
 def build_compensation(
     rig: RigSettings, friction_text: str, *, is_simulated: bool
 ) -> FrictionCompensation | None:
-    """Return what takes friction off the hand; None where rig.toml has none.
+    """Return the friction compensation; None if rig.toml has none.
 
     Raises:
-        SettingsError: the calibration is none, was made with another gravity, or with
-            a simulated arm for a real one or conversely.
+        SettingsError: the calibration is invalid, was made with another gravity, or
+            with a simulated arm for a real one or vice versa.
     """
     section = rig.friction
     if section.model == "none":
@@ -173,43 +174,43 @@ def build_compensation(
     if fault and not stored.is_forced:
         raise unfit(section.file, fault, "friction", _WITHOUT)
     _check_size(section.file, constants, fit.friction)
-    known = friction_lower_bound(fit.friction, fit.deviation, fit.asymmetry_deviation)
-    return FrictionCompensation(constants, known, section.compensation)
+    bound = friction_lower_bound(fit.friction, fit.deviation, fit.asymmetry_deviation)
+    return FrictionCompensation(constants, bound, section.compensation)
 
 
 def gravity_fault(stored: GravityCalibration) -> str:
-    """Return why "traction calibrate gravity" would refuse it, "" = it would not."""
+    """Return why "traction calibrate gravity" would refuse the fit, "" if not."""
     return fault_of(lambda: check_gravity(load_constants(), stored))
 
 
 def friction_fault(stored: FrictionCalibration) -> str:
-    """Return why "traction calibrate friction" would refuse it, "" = it would not."""
+    """Return why "traction calibrate friction" would refuse the fit, "" if not."""
     return fault_of(lambda: check_friction(stored.fit))
 
 
 def forced_calibrations(settings: Settings, calibrations: LawCalibrations) -> list[str]:
-    """Return a sentence for each calibration in use that a person had to force.
+    """Return a sentence for each calibration in use that was forced.
 
     Raises:
-        SettingsError: a calibration is none.
+        SettingsError: a calibration is invalid.
     """
     rig, words = settings.rig, forced_words(settings)
     if rig.gravity.model == "calibrated":
-        weighed = gravity_from_toml(calibrations.gravity, rig.gravity.file)
-        if fault := gravity_fault(weighed):
+        gravity = gravity_from_toml(calibrations.gravity, rig.gravity.file)
+        if fault := gravity_fault(gravity):
             words.append(f"{rig.gravity.file} was forced. {fault}")
     if rig.friction.model == "calibrated":
-        rubbed = friction_from_toml(calibrations.friction, rig.friction.file)
-        if fault := friction_fault(rubbed):
+        friction = friction_from_toml(calibrations.friction, rig.friction.file)
+        if fault := friction_fault(friction):
             words.append(f"{rig.friction.file} was forced. {fault}")
     return words
 
 
 def _check_size(name: str, constants: ArmConstants, friction: MotorFriction) -> None:
-    """Refuse friction that no arm of this kind has: it would drive the arm."""
+    """Refuse implausibly large friction: its compensation would drive the arm."""
     coulomb = joint_coulomb(constants, friction.coulomb)
-    most = _LARGEST * constants.coulomb
-    for joint, (torque, limit) in enumerate(zip(coulomb, most, strict=True), 1):
+    limits = _LARGEST * constants.coulomb
+    for joint, (torque, limit) in enumerate(zip(coulomb, limits, strict=True), 1):
         if torque > limit:
             raise SettingsError(
                 f"{name} gives {torque:.2f} N m of friction at joint {joint}, more "
@@ -219,7 +220,7 @@ def _check_size(name: str, constants: ArmConstants, friction: MotorFriction) -> 
 
 
 def law_words(rig: RigSettings, calibrations: LawCalibrations, foot: str) -> str:
-    """Return the choices in words, for a session with `foot`."""
+    """Describe gravity and friction model, for a session with `foot`."""
     weight = f"gravity {gravity_words(rig, calibrations.gravity, foot)}"
     if rig.friction.model == "none":
         return f"{weight}, friction not compensated"
@@ -229,7 +230,7 @@ def law_words(rig: RigSettings, calibrations: LawCalibrations, foot: str) -> str
 
 
 def gravity_words(rig: RigSettings, gravity_text: str, foot: str) -> str:
-    """Return how the arm is weighed in words, for a session with `foot`."""
+    """Describe the gravity model, for a session with `foot`."""
     if rig.gravity.model != "calibrated":
         return rig.gravity.model
     stored = gravity_from_toml(gravity_text, rig.gravity.file)

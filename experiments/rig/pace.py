@@ -1,21 +1,21 @@
-"""Stepped time held back by the wall clock, so that a person can follow it."""
+"""Pacing of stepped time to real time, so that a person can follow it."""
 
 from acquisition.clock import Clock
 
-_LATE_NS = 100_000_000  # a world that is later than this does not catch up
-_WINDOW_NS = 2_000_000_000  # of the wall, over which the speed is told
+_LATE_NS = 100_000_000  # largest lateness that is caught up
+_WINDOW_NS = 2_000_000_000  # averaging time of the speed
 
 
 class WallPace:
-    """Lets simulated time pass no faster than time on the wall.
+    """Limits simulated time to the speed of real time.
 
-    Where the computer is too slow for that, the simulated world is late and stays so:
-    it never hurries, for a person who acts in it would be hurried too. What happens in
-    it depends on simulated time alone, so nothing that is recorded knows of the wall.
+    On a slow computer the simulation stays late: it never catches up, since that would
+    hurry a person who acts in it. Events depend on simulated time alone, so recordings
+    are independent of real time.
 
     Args:
         world: simulated time.
-        wall: the time of whoever looks on.
+        wall: real time.
     """
 
     def __init__(self, world: Clock, wall: Clock) -> None:
@@ -27,11 +27,11 @@ class WallPace:
 
     @property
     def speed(self) -> float:
-        """How fast simulated time passed lately, as a share of the wall's."""
+        """Recent speed of simulated time, as a share of real time."""
         return self._speed
 
     def keep(self) -> None:
-        """Wait until the wall has come as far as the world; go on at once if it has."""
+        """Wait until real time has reached simulated time."""
         due_ns = self._world.now_ns() + self._origin_ns
         late_ns = self._wall.now_ns() - due_ns
         if late_ns < 0:
@@ -41,7 +41,7 @@ class WallPace:
         self._measure()
 
     def rest(self, seconds: float) -> None:
-        """Let time pass on the wall while it stands in the world [s]."""
+        """Wait `seconds` in real time while simulated time stands still."""
         wall_ns = round(seconds * 1e9)
         self._wall.sleep_until(self._wall.now_ns() + wall_ns)
         self._origin_ns += wall_ns

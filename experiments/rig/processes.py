@@ -1,4 +1,4 @@
-"""The rig's backend with one process for each job."""
+"""The multi-process backend of a rig."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -35,10 +35,10 @@ class WorkerConfigs:
     """Configurations of the processes.
 
     Attributes:
-        control: settings of the process that has the arm.
-        reader: settings of the process that has the sensor's port; None = the sensor
-            hangs on the arm's bus.
-        fake: settings of the simulated rig; None = the devices are real.
+        control: settings of the process that drives the arm.
+        reader: settings of the process that reads the sensor's port; None = the sensor
+            is on the arm's bus.
+        fake: settings of the simulated rig; None = real devices.
     """
 
     control: dict[str, Any]
@@ -47,10 +47,10 @@ class WorkerConfigs:
 
 
 class MultiProcessBackend:
-    """A process for the loop, one for the recorder, one for a serial sensor.
+    """Separate processes for loop, recorder and serial sensor.
 
-    The simulated devices have a process of their own too. All die with the console;
-    the one with the arm idles it first.
+    Simulated devices run in a further process. All die with the console; the one with
+    the arm idles it first.
     """
 
     def __init__(
@@ -63,13 +63,13 @@ class MultiProcessBackend:
         """Start the processes; nothing is sent yet.
 
         Args:
-            jobs: settings of each.
-            shared: the memory they share.
-            clock: the console's time.
-            lock: of the arm, given back by `close`; None = the bus is private.
+            jobs: settings of each process.
+            shared: the shared memory.
+            clock: the console's clock.
+            lock: lock of the arm, released by `close`; None = private bus.
 
         Raises:
-            PreflightError: processes cannot share memory safely on this machine.
+            PreflightError: shared memory is not safe on this machine.
         """
         require_ordered_stores()
         self._shared = shared
@@ -100,11 +100,11 @@ class MultiProcessBackend:
 
     @property
     def recorder_pid(self) -> int:
-        """Number of the process that writes the trials."""
+        """Process id of the recorder."""
         return self._children["recorder"].pid
 
     def ask(self, request: Request[Answer]) -> Answer:
-        """Return the answer of the process that has the device; see `requests`."""
+        """Send a request to the process that has the device; see `requests`."""
         kind = type(request)
         if kind is StartArm:
             self._claim()
@@ -112,7 +112,7 @@ class MultiProcessBackend:
         return (child or self._control).ask(request)
 
     def _claim(self) -> None:
-        """Refuse another program's arm; nothing is sent to it then, nor at the end."""
+        """Refuse another program's arm; nothing is ever sent to it then."""
         try:
             self._control.ask(ClaimArm())
         except (PreflightError, LinkError):
@@ -121,19 +121,19 @@ class MultiProcessBackend:
         self._is_claimed = True
 
     def sensor_metadata(self) -> dict[str, str]:
-        """Return what became of the sensor's samples since it was opened, as text.
+        """Return counters of the sensor's stream since it was opened, as text.
 
-        Nothing for a sensor on the arm's bus, whose process has a loop to run.
+        Empty for a sensor on the arm's bus, whose process is busy with the loop.
         """
         return {} if self._reader is None else self._reader.ask(AskStream())
 
     def begin(self) -> None:
-        """Let the loop run from here on."""
+        """Start the loop."""
         self.loop_client.beat()
         self._control.ask(BeginLoop())
 
     def grants(self) -> dict[str, list[Grant]]:
-        """Return what the kernel granted to each process."""
+        """Return the scheduling rights granted to each process."""
         grants: dict[str, list[Grant]] = {}
         if not self.loop_client.loop.is_running:
             grants[_CONTROL] = self._control.ask(AskGrants())
@@ -147,19 +147,19 @@ class MultiProcessBackend:
         return str(self._jobs.control["can"]["channel"])
 
     def end_loop(self) -> None:
-        """Let the loop end; the process with the arm answers again."""
+        """End the loop; the process with the arm answers requests again."""
         self.loop_client.leave()
         while self.loop_client.loop.is_running and self._control.is_alive:
             self._clock.sleep_until(self._clock.now_ns() + PERIOD_NS)
 
     def processes(self) -> dict[str, int]:
-        """Return the numbers of the processes by name."""
+        """Return the process ids by name."""
         return {name: child.pid for name, child in self._children.items()}
 
     def idle(self) -> bool:
-        """Idle the arm; when its process has died, a new one does it.
+        """Idle the arm; if its process has died, a new one does it.
 
-        An arm that was refused at its start is left as it is.
+        An arm that was refused at its start is left unchanged.
         """
         if not self._is_claimed:
             return False
@@ -170,13 +170,13 @@ class MultiProcessBackend:
         return self._control.ask(IdleArm())
 
     def safety_mode(self) -> SafetyMode:
-        """Return the safety module's newest mode."""
+        """Return the latest mode of the safety module."""
         if self.loop_client.loop.is_running or not self._control.is_alive:
             return self.loop_client.status.safety
         return self._control.ask(AskSafetyMode())
 
     def close(self) -> None:
-        """Idle the arm if it got torques and end all processes; safe to repeat."""
+        """Idle the arm if torques were sent, and end all processes; safe to repeat."""
         if not self._children:
             return
         try:
@@ -185,7 +185,7 @@ class MultiProcessBackend:
             if self._control.is_alive and self.loop_client.loop.is_running:
                 self.loop_client.leave()
         except TractionError:
-            pass  # without questions for positions the safety module idles the arm
+            pass  # without position requests the safety module idles the arm
         finally:
             for child in reversed(self._children.values()):
                 child.stop()
@@ -195,7 +195,7 @@ class MultiProcessBackend:
                 self._lock.close()
 
     def _may_hold(self) -> bool:
-        """Return whether the arm may have torques that its process does not end."""
+        """Return whether the arm may still have torques."""
         if not self._is_claimed:
             return False
         loop_client = self.loop_client
@@ -205,7 +205,7 @@ class MultiProcessBackend:
         return loop_client.loop.is_running and not is_idle
 
     def _spawn_fake(self, settings: dict[str, Any]) -> Child:
-        """Start the simulated rig and tell the others where its devices are."""
+        """Start the simulated rig and pass its addresses to the other processes."""
         child = self._spawn("fake rig", "fakes.serving.rig_process:main", settings)
         served = child.ask(AskDevices())
         self._jobs.control["can"] = {
@@ -227,7 +227,7 @@ class MultiProcessBackend:
         return child
 
     def _advance(self, cycles: int) -> None:
-        """Let time pass; raise once for every process that has died meanwhile."""
+        """Advance time; raises once for every process that has died meanwhile."""
         self._clock.sleep_until(self._clock.now_ns() + cycles * PERIOD_NS)
         for name, child in self._children.items():
             if name not in self._reported and not child.is_alive:

@@ -1,6 +1,6 @@
-"""What the console asks of arm and sensor while the loop does not run.
+"""Requests of the console to arm and sensor while the loop does not run.
 
-`arm_service` carries it out, in the thread of the console or in a process.
+`arm_service` executes them, in the thread of the console or in a process.
 """
 
 from dataclasses import dataclass
@@ -11,23 +11,23 @@ from acquisition.ipc.requests import Request
 from wam.driver.startup import ArmInfo
 from wam.driver.survey import Answers, RestTraffic
 
-EXCHANGE_CYCLES = 100  # in which positions are asked for
+EXCHANGE_CYCLES = 100  # cycles with a position request
 
 
 @dataclass(frozen=True, slots=True)
 class ExchangeTimes:
-    """What came of questions for the positions, without torque.
+    """Timing of position requests without torque.
 
     Attributes:
-        replies_ns: from request to seventh position [ns]; incomplete exchanges are left
-            out.
-        unasked: cycles in which no position was asked for.
-        late: of these, in which positions came: they answer an earlier question.
-        age_ns: between the last question and the last position that came [ns], 0 =
-            none came after its cycle.
-        answer_ns: from a question for a property to its answer [ns], median; 0 = none
-            was answered.
-        jumps: cycles with a position that was not believed; the arm stands.
+        replies_ns: times from request to seventh position [ns], complete exchanges
+            only.
+        unasked: cycles without a position request.
+        late: of these, cycles in which positions arrived: they answer an earlier
+            request.
+        age_ns: time from the last request to the last late position [ns], 0 = none was
+            late.
+        answer_ns: median time from a property request to its reply [ns]; 0 = no reply.
+        jumps: cycles with an implausible position; the arm stands still.
     """
 
     replies_ns: list[int]
@@ -40,7 +40,7 @@ class ExchangeTimes:
 
 @dataclass(frozen=True, slots=True)
 class ClaimArm(Request[None]):
-    """Open the bus and refuse an arm that is another program's.
+    """Open the bus and refuse an arm used by another program.
 
     Raises PreflightError: another master talks, or the arm is active; LinkError: the
     bus cannot be opened, or is down.
@@ -49,72 +49,72 @@ class ClaimArm(Request[None]):
 
 @dataclass(frozen=True, slots=True)
 class StartArm(Request[ArmInfo]):
-    """Find, wake and question the arm; raises as `WamArm.start`.
+    """Find and wake the arm, read its properties; raises as `WamArm.start`.
 
-    Where the bus is shared, another program's arm is refused first, as by `ClaimArm`;
-    nothing is sent to it then, not even at the end.
+    On a shared bus another program's arm is refused first, as by `ClaimArm`; nothing is
+    ever sent to it then.
     """
 
 
 @dataclass(frozen=True, slots=True)
 class Listen(Request[RestTraffic]):
-    """Ask for nothing for `seconds`; what was heard. Raises LinkError."""
+    """Listen silently for `seconds`; returns the traffic. Raises LinkError."""
 
     seconds: float
 
 
 @dataclass(frozen=True, slots=True)
 class CountAnswers(Request[Answers]):
-    """How often do devices answer a question that is asked `times` times?"""
+    """Count the replies of devices to a request sent `times` times."""
 
     times: int
 
 
 @dataclass(frozen=True, slots=True)
 class LastAnswers(Request[list[dict[str, int | None]]]):
-    """What did pucks 1 to 7 say at the last start, by name?"""
+    """Properties of pucks 1 to 7 as read at the last start, by name."""
 
 
 @dataclass(frozen=True, slots=True)
 class MeasureExchange(Request[ExchangeTimes]):
-    """Ask `EXCHANGE_CYCLES` times for the positions, a period apart, without torque."""
+    """Request all positions `EXCHANGE_CYCLES` times, once a period, without torque."""
 
 
 @dataclass(frozen=True, slots=True)
 class DefinePosition(Request[None]):
-    """Tell the arm that its joints stand at `q` [rad], seven; see `WamArm`."""
+    """Define the present joint positions as `q` [rad], seven; see `WamArm`."""
 
     q: list[float]
 
 
 @dataclass(frozen=True, slots=True)
 class OpenSensor(Request[dict[str, str]]):
-    """Open the wrist sensor; what it says about itself.
+    """Open the wrist sensor; returns its description.
 
-    Raises LinkError: it is silent; DeviceFaultError: it is not well.
+    Raises LinkError: the sensor is silent; DeviceFaultError: it reports a fault.
     """
 
 
 @dataclass(frozen=True, slots=True)
 class AskStream(Request[dict[str, str]]):
-    """What became of the sensor's samples since it was opened, as text?"""
+    """Counters of the sensor's stream since it was opened, as text."""
 
 
 @dataclass(frozen=True, slots=True)
 class BeginLoop(Request[None]):
-    """Let the loop run once this is answered."""
+    """Start the loop after the reply."""
 
 
 @dataclass(frozen=True, slots=True)
 class IdleArm(Request[bool]):
-    """Idle the arm; is that confirmed?"""
+    """Idle the arm; returns whether that is confirmed."""
 
 
 @dataclass(frozen=True, slots=True)
 class AskSafetyMode(Request[SafetyMode]):
-    """Which mode did the safety module report last?"""
+    """Latest mode reported by the safety module."""
 
 
 @dataclass(frozen=True, slots=True)
 class AskGrants(Request[list[Grant]]):
-    """What did the kernel grant to this process?"""
+    """Scheduling rights granted to this process."""

@@ -1,4 +1,4 @@
-"""The composition root: settings and a row of the matrix in, a rig out."""
+"""Composition root: builds a rig from settings and a row of the matrix."""
 
 from __future__ import annotations
 
@@ -41,21 +41,20 @@ from wam.model.arm_model import ArmModel
 
 @dataclass(frozen=True, slots=True)
 class FakeOptions:
-    """How a simulated session runs.
+    """Options of a simulated session.
 
     Attributes:
-        mode: stepped time at the pace of the wall, as fast as it can, or the processes
-            of the real rig.
-        seed: of everything random.
-        friction: of the joints, as a share of what was identified on another arm.
-        pace: how the simulated person pushes, a name of `fakes.plant.push.PACES`.
-        cables: resonance of the joints on their cables [Hz]; None = stiff ones.
-        spread: the rig is one of many sound ones, drawn by the seed; a wrong one is
-            always.
-        mount: turns of the true base about x, then y, then z [degrees], which the
-            program does not know; None = as it believes.
-        wrong: name of what is wrong with the rig in the catalogue of wrong rigs; "" =
-            nothing.
+        mode: stepped time paced to real time or at full speed, or the processes of the
+            real rig.
+        seed: seed of all random numbers.
+        friction: joint friction as a share of that identified on another arm.
+        pace: style of the simulated person's push, a name of `fakes.plant.push.PACES`.
+        cables: resonance of the joints on their cables [Hz]; None = stiff cables.
+        spread: whether the rig is drawn from the population of sound ones, by the seed;
+            always for a wrong one.
+        mount: true rotations of the base about x, then y, then z [degrees], unknown to
+            the program; None = as in the settings.
+        wrong: name of the defect in the catalogue of wrong rigs; "" = none.
     """
 
     mode: TimeMode
@@ -69,7 +68,7 @@ class FakeOptions:
 
     @property
     def truth(self) -> RigTruth | None:
-        """What is true of the rig, but not believed; None = nothing."""
+        """True deviations of the rig from its settings; None = none."""
         if not (self.spread or self.wrong or self.mount):
             return None
         spread = self.spread or bool(self.wrong)
@@ -81,21 +80,21 @@ class Rig:
     """Everything a session needs, real or simulated.
 
     Attributes:
-        clock: the console's time.
-        backend: serves bus, sensor and loop.
-        shared: the memory that the processes share.
+        clock: the console's clock.
+        backend: access to bus, sensor and loop.
+        shared: the shared memory.
         model: the arm with its tool.
-        law_model: the same as the control law weighs it.
-        payload: what the sensor carries, not tared.
-        tared: the same with the bias of the newest tare.
-        serials: of the seven pucks, as the preflight read them; None = unknown.
-        tared_ns: when that was taken [ns]; 0 = never.
-        frame: where the container stands.
+        law_model: gravity model of the control law.
+        payload: load of the sensor, not tared.
+        tared: payload with the bias of the latest tare.
+        serials: serial numbers of the seven pucks from the preflight; None = unknown.
+        tared_ns: time of the latest tare [ns]; 0 = never.
+        frame: terrain frame.
         row: row of the matrix.
         settings: all settings.
-        calibrations: of gravity and friction.
+        calibrations: texts of the gravity and friction calibrations.
         simulation: handle of the simulation; None on the real rig.
-        pace: of stepped time, against the wall's; None where that is the clock.
+        pace: pacing of stepped time to real time; None on a real-time clock.
     """
 
     clock: Clock
@@ -126,10 +125,11 @@ class Rig:
 
 
 def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> Rig:
-    """Return the rig for one session: on stepped time in this thread, else processes.
+    """Build the rig of one session: stepped in this thread, or in processes.
 
     Raises:
-        SettingsError: a calibration cannot be used, or a number is none of a real arm.
+        SettingsError: a calibration cannot be used, or a number is not permitted on a
+            real arm.
         LinkError: a process cannot open its bus or port.
         PreflightError: another program has the arm.
     """
@@ -137,7 +137,7 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
         settings.check_real()
     is_simulated = fake is not None
     world: SimulatedRig | None = None
-    if fake is not None:  # a simulated world does not know what was calibrated
+    if fake is not None:  # the simulation is built from uncalibrated settings
         world = _world(settings, row.name, fake)
     if fake is not None and fake.wrong:
         settings = typed_wrongly(settings, fake.wrong)
@@ -194,8 +194,8 @@ def _world(settings: Settings, terrain: str, fake: FakeOptions) -> SimulatedRig:
 def _start_processes(
     jobs: WorkerConfigs, settings: Settings, shared: SharedLayout, clock: Clock
 ) -> MultiProcessBackend:
-    """Return the backend in processes; a bus that others may open is locked first."""
-    if jobs.fake is not None:  # its bus is its own
+    """Return the multi-process backend; a shared bus is locked first."""
+    if jobs.fake is not None:  # private bus
         return MultiProcessBackend(jobs, shared, clock)
     can = settings.rig.can
     lock = ArmLock(can.interface, can.channel)
@@ -207,10 +207,10 @@ def _start_processes(
 
 
 def _terminal() -> str:
-    """Return the path of the console's terminal, "" where it has none."""
+    """Return the path of the console's terminal, "" if it has none."""
     try:
         return os.ttyname(2)
-    except OSError:  # none, or one without a name: a serial console, another mount
+    except OSError:  # no terminal, or one without a name
         return ""
 
 
@@ -220,7 +220,7 @@ def _jobs(
     calibrations: LawCalibrations,
     world: dict[str, Any] | None,
 ) -> WorkerConfigs:
-    """Return the settings of the processes; `world` is of the simulated rig."""
+    """Return the settings of the processes; `world` is that of the simulated rig."""
     rig, lost = settings.rig, settings.folder / LOST_POSITIONS
     common: dict[str, Any] = {
         "rig": rig.model_dump(mode="json"),
@@ -231,7 +231,7 @@ def _jobs(
         "row": row.model_dump(mode="json"),
         "gravity": calibrations.gravity,
         "friction": calibrations.friction,
-        # A simulated arm is as it left the factory, and has no past.
+        # A simulated arm has factory properties and no history.
         "properties": read_properties(settings) if world is None else "",
         "lost_positions": str(lost) if world is None else "",
         "can": rig.can.model_dump(mode="json"),

@@ -5,22 +5,22 @@ from experiments.operator.prompts import Prompt, PromptState
 
 _ASIDE = frozenset(
     {Prompt.PAUSED, Prompt.DAMPED, Prompt.NOTE}
-)  # the hand stays where it is
+)  # prompts at which the hand does not move
 
 
 class SimulatedHand:
-    """Moves the simulated hand and pendant as the prompts ask."""
+    """Moves the simulated hand and pendant as the prompts demand."""
 
     def __init__(self, simulation: SimulationControl) -> None:
         self._simulation = simulation
-        self._seen: tuple[Prompt, int, int] | None = None
+        self._handled: tuple[Prompt, int, int] | None = None
 
     def follow(self, state: PromptState) -> None:
-        """Do what a person would do at this prompt; once per prompt."""
+        """Act as a person would at this prompt; once per prompt."""
         key = (state.prompt, state.trial, state.attempt)
-        if key == self._seen or state.prompt in _ASIDE:
+        if key == self._handled or state.prompt in _ASIDE:
             return
-        self._seen = key
+        self._handled = key
         if state.prompt is Prompt.SUPPORT:
             self._simulation.lift()
             self._simulation.pendant("activate")

@@ -1,4 +1,4 @@
-"""Options that say what is true of a simulated rig; imports nothing slow."""
+"""Options on true deviations of a simulated rig; imports nothing slow."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ _DEGREES = number_within(-180.0, 180.0, "degrees -180..180, e.g. 90")
 
 
 class WrongRigChoice(Action):
-    """Takes the name of a wrong rig; `help`, or a name that there is not, lists them.
+    """Accepts the name of a wrong rig; `help` or an unknown name lists them.
 
-    The catalogue is read when the option is given, not before.
+    The catalogue is read only if the option is given.
     """
 
     def __call__(
@@ -29,7 +29,7 @@ class WrongRigChoice(Action):
         values: str | Sequence[object] | None,
         option_string: str | None = None,
     ) -> None:
-        """Keep the name.
+        """Store the name.
 
         Raises:
             ArgumentError: there is no such rig.
@@ -39,7 +39,7 @@ class WrongRigChoice(Action):
         del option_string
         name, rigs = str(values), wrong_rigs()
         width = max(map(len, rigs))
-        lines = "\n".join(f"  {each:{width}}  {rigs[each]}" for each in rigs)
+        lines = "\n".join(f"  {rig:{width}}  {rigs[rig]}" for rig in rigs)
         if name == _HELP:
             sys.stdout.write(f"{lines}\n")
             parser.exit()
@@ -51,7 +51,7 @@ class WrongRigChoice(Action):
 
 
 def add_truth(parser: ArgumentParser) -> None:
-    """Declare what is true of the simulated rig, but not believed."""
+    """Declare the options on true deviations of the simulated rig."""
     parser.add_argument(
         "--mount",
         nargs=3,
@@ -70,7 +70,7 @@ def add_truth(parser: ArgumentParser) -> None:
 
 
 def check_truth(args: Namespace) -> None:
-    """Refuse what is true of a simulated rig where the rig is real.
+    """Refuse these options on a real rig.
 
     Raises:
         SettingsError: --mount or --wrong without --fake.
@@ -84,7 +84,7 @@ def check_truth(args: Namespace) -> None:
 
 
 def mount_of(args: Namespace) -> tuple[float, float, float] | None:
-    """Return the turns of the base [degrees]; None = as it is believed."""
+    """Return the rotations of the base [degrees]; None = as in the settings."""
     if args.mount is None:
         return None
     x, y, z = args.mount
@@ -92,9 +92,9 @@ def mount_of(args: Namespace) -> tuple[float, float, float] | None:
 
 
 def truth_of(args: Namespace, seed: int | None) -> RigTruth | None:
-    """Return what is true of a served arm; None = what is believed.
+    """Return the true deviations of a served arm; None = none.
 
-    It is one of many sound ones where it has a seed, or something wrong.
+    With a seed or a defect the arm is drawn from the population of sound ones.
     """
     from experiments.rig.fake import RigTruth
 

@@ -1,4 +1,4 @@
-"""The processes beside the console: one drives the arm, one reads the sensor."""
+"""Worker processes: one drives the arm, one reads the sensor."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ from wam.driver.arm import WamArm
 
 CONTROL_PRIORITY = 80
 READER_PRIORITY = 60
-READ_NS = 20_000_000  # the reader shows being alive this often
+READ_NS = 20_000_000  # period of the reader's heartbeat
 
 
 def control(context: ChildContext) -> None:
-    """Drive the arm: answer the console, then run the loop until it says so."""
+    """Drive the arm: answer the console, then run the loop until it ends."""
     name_process("traction-control")
     ControlWorker(context).serve()
 
@@ -75,11 +75,11 @@ class ControlWorker:
         self._is_orphaned = False
         signal.signal(signal.SIGTERM, self._note_orphaned)
         core = settings.get("core")
-        wish = RealtimeRequest(CONTROL_PRIORITY, core, is_locked=True, is_awake=True)
-        self._grants = request(wish)
+        rights = RealtimeRequest(CONTROL_PRIORITY, core, is_locked=True, is_awake=True)
+        self._grants = request(rights)
 
     def serve(self) -> None:
-        """Answer until the console hangs up; an arm that got torques is idled then."""
+        """Answer until the console hangs up; then idle an arm with torques."""
         service = self._service
         dispatcher = Dispatcher(service.handlers(), {AskGrants: lambda: self._grants})
         try:
@@ -112,7 +112,7 @@ class ControlWorker:
         return arm, link
 
     def _check(self, arm: WamArm, link: CanLink) -> None:
-        """Refuse an arm that is another program's; raises PreflightError, LinkError."""
+        """Refuse an arm used by another program; raises PreflightError, LinkError."""
         can = self._context.settings["can"]
         check_alone(link, self._clock, f"{can['interface']}:{can['channel']}")
         check_inactive(arm)
@@ -131,7 +131,7 @@ class ControlWorker:
         )
 
     def _run(self, loop_server: LoopServer) -> None:
-        """Run the loop; whatever ends it, an arm that got torques is idled."""
+        """Run the loop; however it ends, an arm with torques is idled."""
         loop = Loop(loop_server, self._clock, stats=loop_server.stats)
         try:
             while not loop_server.is_over:
@@ -140,7 +140,7 @@ class ControlWorker:
                 loop.step()
         finally:
             arm = self._service.arm
-            if arm.sent_ns:  # any other arm is left as it is
+            if arm.sent_ns:  # any other arm is left unchanged
                 arm.idle()
             loop_server.leave()
 
@@ -159,7 +159,7 @@ class ControlWorker:
 
 
 def reader(context: ChildContext) -> None:
-    """Read a serial wrist sensor and put every sample into the shared memory."""
+    """Read a serial wrist sensor and publish its samples in the shared memory."""
     name_process("traction-reader")
     SensorWorker(context).serve()
 
@@ -177,7 +177,7 @@ class SensorWorker:
         )
 
     def serve(self) -> None:
-        """Answer the console and read what comes until it hangs up."""
+        """Answer the console and read samples until it closes the channel."""
         channel = self._context.channel
         dispatcher = Dispatcher(
             {
@@ -196,7 +196,7 @@ class SensorWorker:
             self._reconnecting.close()
 
     def open_sensor(self) -> dict[str, str]:
-        """Open the sensor; return its description."""
+        """Open the sensor; returns its description."""
         fields = self._reconnecting.open()
         self._is_open = True
         return fields
@@ -209,13 +209,13 @@ class SensorWorker:
         return build_sensor(rig, port, self._clock, is_simulated=is_simulated)
 
     def _read(self) -> None:
-        """Publish what arrives within 20 ms; what is lost is looked for."""
+        """Publish the samples of 20 ms; reconnects a lost sensor."""
         clock, shared = self._clock, self._context.shared
         deadline_ns = clock.now_ns() + READ_NS
         if self._reconnecting.sensor is None:
             clock.sleep_until(deadline_ns)
         else:
-            # A port that has gone is readable, and says so when it is read.
+            # A removed port is readable and fails when it is read.
             with contextlib.suppress(TractionError):
                 clock.wait(self._reconnecting.sensor, deadline_ns)
         publish(self._reconnecting.poll(clock.now_ns()), shared.wrenches)

@@ -1,4 +1,4 @@
-"""The console loop: time passes, keys and stops are read, rehearsed faults injected."""
+"""The console's cycle: advance time, read keys and stops, inject planned faults."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -30,16 +30,16 @@ from experiments.run.stop import (
 from experiments.session.sidecar import TrialName
 
 TICK = 0.02  # period of the console [s]
-REFRESH_NS = 125_000_000  # between two pictures of the live screen
-DAMP_SECONDS = 0.2  # between an urgent stop and idle
-_OWN_QUIT = frozenset({Prompt.REVIEW, Prompt.READY})  # [q] has a meaning of its own
-# Nothing is wanted of the arm.
+REFRESH_NS = 125_000_000  # period of the live screen
+DAMP_SECONDS = 0.2  # from an urgent stop to idle
+_OWN_QUIT = frozenset({Prompt.REVIEW, Prompt.READY})  # [q] has another meaning
+# Prompts at which the arm has nothing to do.
 _AT_REST = frozenset(
     {Prompt.REVIEW, Prompt.PAUSED, Prompt.DAMPED, Prompt.UNDO, Prompt.LAY_DOWN}
 )
 _DAMPED = "ARM: damped where it is. [space] once you hold it: then it holds again."
-# Faults after which no hand is to lead the arm by what is known of its place.
-_LED_ASTRAY = frozenset(
+# Faults after which the measured pose is not reliable enough to lead the arm.
+_POSE_UNRELIABLE = frozenset(
     {
         Fault.REPLIES_LATE,
         Fault.POSITION_JUMP,
@@ -48,19 +48,19 @@ _LED_ASTRAY = frozenset(
         Fault.PUCK_DOUBLED,
     }
 )
-# Of an arm whose motors work.
+# States in which the motors are driven.
 _DRIVEN = frozenset({ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE})
-LAY_DOWN_SECONDS = 60.0  # the arm waits so long for a hand before it goes idle
-# At these simulated time decides what comes next, not a key.
-_WORLD_ACTS = frozenset({Prompt.RECORDING, Prompt.MOVING, Prompt.LIFT, Prompt.UNDO})
-_SETTLED_NS = 2_000_000_000  # at any other, it is at rest so long after the hand
-_REST_TICKS = 50  # of the wall to one of a world at rest
-_SLOW = 0.95  # of real time; below it the screen says so
-_ON_STAND = 0.1  # rad
-_STANDS = 0.3  # s, in which an arm that holds has come to rest
+LAY_DOWN_SECONDS = 60.0  # the arm waits this long for the operator, then goes idle
+# Prompts that simulated time ends, not a key.
+_TIMED_PROMPTS = frozenset({Prompt.RECORDING, Prompt.MOVING, Prompt.LIFT, Prompt.UNDO})
+_SETTLED_NS = 2_000_000_000  # at the others, from the last action to rest
+_REST_TICKS = 50  # ticks of real time per tick of a simulation at rest
+_SLOW = 0.95  # share of real time below which the screen shows it
+_STAND_TOLERANCE = 0.1  # rad
+_SETTLE_SECONDS = 0.3  # s, time to rest of a holding arm
 _SUPPORT = "Support the arm: it goes idle and sinks slowly. [i]dle"
 _LAY_DOWN = "Lay the foot onto its stand: the arm goes idle and sinks slowly. [i]dle"
-_NOBODY = f"No answer for {LAY_DOWN_SECONDS:.0f} s: the arm goes idle. Support it."
+_NO_ANSWER = f"No answer for {LAY_DOWN_SECONDS:.0f} s: the arm goes idle. Support it."
 _TOO_LATE = "No verdict to take back. Any trial, any time: traction verdict --help"
 _T = TypeVar("_T")
 View = Callable[[int], list[str]]
@@ -68,16 +68,16 @@ View = Callable[[int], list[str]]
 
 @dataclass(slots=True)
 class ConsoleLoop:
-    """Lets time pass for rig, operator and screen together, 20 ms at a time.
+    """Advances rig, operator and screen together in steps of 20 ms.
 
     Attributes:
         rig: the rig, its loop running.
-        console: where everything is printed.
+        console: output.
         operator: answers the prompts.
         stop: requests to stop.
-        hand: of a simulated operator; None where a person moves the arm.
-        faults: to be injected into a rehearsal; None on a real rig.
-        undo_until_ns: until when the newest verdict can be taken back [ns].
+        hand: hand of a simulated operator; None if a person moves the arm.
+        faults: planned faults of a rehearsal; None on a real rig.
+        undo_until_ns: time until which the newest verdict can be undone [ns].
     """
 
     rig: Rig
@@ -90,12 +90,12 @@ class ConsoleLoop:
     _view: View | None = field(default=None, init=False)
     _shown_ns: int = field(default=0, init=False)
     _prompt: tuple[Prompt, int, int] | None = field(default=None, init=False)
-    _prompt_ns: int = field(default=0, init=False)  # when `_prompt` began
-    _acted_ns: int = field(default=0, init=False)  # newest key, move, prompt
-    _rests: int = field(default=0, init=False)  # ticks since
-    _rested_ns: int = field(default=0, init=False)  # in which simulated time stood
+    _prompt_ns: int = field(default=0, init=False)  # start of `_prompt`
+    _acted_ns: int = field(default=0, init=False)  # last key, move, prompt
+    _rests: int = field(default=0, init=False)  # ticks since then
+    _rested_ns: int = field(default=0, init=False)  # real time at rest
     _is_stopped: bool = field(default=False, init=False)
-    _told: set[Fault | None] = field(  # faults that persist
+    _reported: set[Fault | None] = field(  # faults that persist
         default_factory=set[Fault | None], init=False
     )
 
@@ -111,13 +111,14 @@ class ConsoleLoop:
         *,
         is_complete: bool = False,
     ) -> str:
-        """Let 20 ms pass and return the key pressed, "" for none.
+        """Advance by 20 ms; returns the key pressed, "" for none.
 
         Raises:
-            ArmFaultError: the guard stopped the arm. Where nothing is wanted of the
-                arm, a fault that persists is raised once: keys are read again.
-            StopRequestedError: a stop was requested; at the review `StopFlag` says so.
-            UndoRequestedError: the newest verdict is taken back, in time.
+            ArmFaultError: the guard stopped the arm. While the arm has nothing to do,
+                a persistent fault is raised only once, so that keys are read again.
+            StopRequestedError: a stop was requested; not at the review, see
+                `StopFlag`.
+            UndoRequestedError: the operator undoes the newest verdict in time.
             TractionError: a process or the disk failed.
         """
         state = self._advance(prompt, name, is_complete=is_complete)
@@ -125,7 +126,7 @@ class ConsoleLoop:
             raise StopRequestedError
         key = self.operator.answer(state)
         if key:
-            self._act()
+            self._resume_simulation()
         if key == "q" and prompt not in _OWN_QUIT:
             raise StopRequestedError
         if key_action(prompt, key) is KeyAction.UNDO:
@@ -137,11 +138,11 @@ class ConsoleLoop:
 
     @property
     def undo_left(self) -> float:
-        """How long the newest verdict can still be taken back [s], 0 = not any more."""
+        """Remaining time to undo the newest verdict [s], 0 = expired."""
         return max(0.0, (self.undo_until_ns - self.rig.clock.now_ns()) * 1e-9)
 
     def line(self, name: TrialName) -> str | None:
-        """Let 20 ms pass; return a note once typed, "" if given up, None before.
+        """Advance by 20 ms; returns a note once typed, "" if cancelled, None before.
 
         Raises:
             ArmFaultError, TractionError: as `tick`.
@@ -151,15 +152,14 @@ class ConsoleLoop:
             return ""
         return self.operator.line(state)
 
-    def _pass_time(self, prompt: Prompt) -> None:
-        """Let 20 ms pass, or let them pass on the wall only.
+    def _advance_time(self, prompt: Prompt) -> None:
+        """Advance by 20 ms, or only wait them in real time.
 
-        A person may read a prompt for minutes. What the simulated world does at it is
-        done soon after its hand is; from then on its time goes at a small share of
-        real time, which costs as little and runs into no limit.
+        A person may read a prompt for minutes. Once the simulation is at rest, its time
+        runs at a small fraction of real time: little load, and no time-outs.
         """
         pace = self.rig.pace
-        if pace is not None and is_person(self.operator) and self._rests_at(prompt):
+        if pace is not None and is_person(self.operator) and self._is_at_rest(prompt):
             self._rests += 1
             if self._rests % _REST_TICKS:
                 pace.rest(TICK)
@@ -167,24 +167,24 @@ class ConsoleLoop:
                 return
         self.loop_client.advance(TICK)
 
-    def _rests_at(self, prompt: Prompt) -> bool:
-        """Return whether the simulated world has nothing left to do at `prompt`."""
+    def _is_at_rest(self, prompt: Prompt) -> bool:
+        """Return whether the simulation is at rest at `prompt`."""
         simulation = self.rig.simulation
         is_led = simulation is not None and not simulation.is_hand_done
         if self._prompt is None or prompt is not self._prompt[0] or is_led:
-            self._act()
+            self._resume_simulation()
         waited_ns = self.rig.clock.now_ns() - self._acted_ns
-        return prompt not in _WORLD_ACTS and waited_ns >= _SETTLED_NS
+        return prompt not in _TIMED_PROMPTS and waited_ns >= _SETTLED_NS
 
-    def _act(self) -> None:
-        """Let the simulated world go on: there is something to do, or a key."""
+    def _resume_simulation(self) -> None:
+        """End the rest of the simulation, for a key or a motion."""
         self._acted_ns, self._rests = self.rig.clock.now_ns(), 0
 
     def _advance(
         self, prompt: Prompt, name: TrialName | None, *, is_complete: bool = False
     ) -> PromptState:
-        """Let 20 ms pass and return the prompt, which the simulated hand follows."""
-        self._pass_time(prompt)
+        """Advance by 20 ms; returns the prompt, which the simulated hand follows."""
+        self._advance_time(prompt)
         self._refresh()
         self._raise_fault(prompt)
         if self.console.is_lost:
@@ -201,44 +201,44 @@ class ConsoleLoop:
         return state
 
     def require_no_fault(self) -> None:
-        """Raise what the guard found while nothing was asked of the arm.
+        """Raise a fault that occurred outside `tick`.
 
         Raises:
-            ArmFaultError: it did.
+            ArmFaultError: the guard stopped the arm.
         """
         control = self.loop_client.status
         if self.loop_client.is_news(control):
             raise self._fault(control)
 
     def _raise_fault(self, prompt: Prompt) -> None:
-        """Raise the guard's strictest verdict, unless it is told and only persists."""
+        """Raise the guard's strictest verdict, unless reported and persistent."""
         control = self.loop_client.status
         if control.verdict is None or prompt not in _AT_REST:
-            self._told.clear()
+            self._reported.clear()
         if control.verdict is None:
             return
-        is_told = control.verdict.fault in self._told
+        is_reported = control.verdict.fault in self._reported
         fault = self._fault(control)
-        if not is_told:
+        if not is_reported:
             raise fault
 
     def _fault(self, control: ControlStatus) -> ArmFaultError:
-        """Return the strictest verdict that stands, to be told; tell the others."""
+        """Return the strictest active verdict as an error; print the others."""
         strictest, *others = control.standing
         for verdict in others:
-            self._tell_besides(verdict)
-        self._told.add(strictest.fault)
+            self._print_fault(verdict)
+        self._reported.add(strictest.fault)
         self.loop_client.note(control)
         return ArmFaultError(strictest)
 
-    def _tell_besides(self, verdict: GuardVerdict) -> None:
-        """Say a fault that is not the strictest, once while it persists."""
-        if verdict.fault not in self._told:
-            self._told.add(verdict.fault)
+    def _print_fault(self, verdict: GuardVerdict) -> None:
+        """Print a fault other than the strictest, once while it persists."""
+        if verdict.fault not in self._reported:
+            self._reported.add(verdict.fault)
             self.console.say(f"{WARNING} {fault_words(verdict)}")
 
     def show(self, view: View | None) -> None:
-        """Show what `view(width)` returns eight times a second, None for nothing."""
+        """Show the lines of `view(width)` eight times a second; None ends it."""
         self._view = view
         self._shown_ns = 0
         self.console.end_panel()
@@ -256,15 +256,15 @@ class ConsoleLoop:
             self.console.panel(lines)
 
     def inject_faults(self, moment: FaultTrigger, number: int, seconds: float) -> None:
-        """Inject the rehearsed faults that are due in trial `number`."""
+        """Inject the planned faults that are due in trial `number`."""
         if self.faults is not None:
             self.faults.inject_due(moment, number, seconds)
 
     def worst_verdict(self, verdict: GuardVerdict) -> GuardVerdict:
-        """Return `verdict`, or the guard's strictest one where that is stricter.
+        """Return the stricter of `verdict` and the guard's strictest active one.
 
-        A fault that persists may cost the arm while a trial is being sealed. The milder
-        one is told here, and every fault that came besides.
+        A fault may escalate while a trial is being sealed. The milder verdict and all
+        other faults are printed here.
         """
         self.loop_client.advance(TICK)
         control = self.loop_client.status
@@ -274,15 +274,15 @@ class ConsoleLoop:
         is_worse = strictest.strictness > verdict.strictness
         worst, milder = (strictest, verdict) if is_worse else (verdict, strictest)
         if milder.fault is not worst.fault:
-            self._told.discard(milder.fault)
-            self._tell_besides(milder)
+            self._reported.discard(milder.fault)
+            self._print_fault(milder)
         return worst
 
     def clear_faults(self, verdict: GuardVerdict = OK) -> None:
-        """Clear rehearsed faults, and the guard's `verdict` with them; the arm holds.
+        """Clear injected faults and the guard's `verdict`; the arm holds.
 
-        An arm that is damped after a fault of motion stays so until the operator has
-        it: only a person knows whether somebody pushed, and whether it is safe.
+        An arm damped after a motion fault stays damped until the operator confirms:
+        only a person knows whether somebody pushed, and whether holding is safe.
 
         Raises:
             ArmFaultError: damping did not help; the arm is idle.
@@ -298,10 +298,10 @@ class ConsoleLoop:
         self.loop_client.advance(0.1)
 
     def run_aside(self, work: Callable[[], _T]) -> _T:
-        """Return what slow `work` returns; the console's heartbeat goes on meanwhile.
+        """Run slow `work` in a thread, with the console's heartbeat going on.
 
         Raises:
-            Exception: what `work` raises.
+            Exception: that of `work`.
         """
         if self.rig.is_stepped:
             return work()
@@ -314,24 +314,24 @@ class ConsoleLoop:
             return future.result()
 
     def stop_arm(self) -> None:
-        """Hold; after an urgent request, damp for a moment and idle, once."""
+        """Hold; after an urgent request, damp briefly, then idle, once."""
         if not self.stop.is_urgent:
             self.loop_client.request(ArmState.HOLD)
         elif not self._is_stopped:
             self._is_stopped = True
             self.loop_client.request(ArmState.DAMP)
             self.loop_client.advance(DAMP_SECONDS)
-            self.loop_client.watch_trial(is_recording=False)  # it ends with the power
+            self.loop_client.watch_trial(is_recording=False)  # idle ends it
             self.loop_client.request(ArmState.IDLE)
             self.loop_client.advance(TICK)
 
     def lay_down(self) -> None:
-        """Have the arm supported before it goes idle, for then it sinks.
+        """Ask the operator to support the arm before it goes idle and sinks.
 
-        It stands still, weakly enough for a hand that carries the foot onto its stand;
-        an arm that is damped for its motion stays so before somebody has it. Without
-        an answer, or at a request to stop, it goes idle all the same; at once after an
-        urgent one, however it came to be here.
+        The arm stands still, compliant enough for the operator to lay the foot onto its
+        stand; an arm damped for its motion stays damped until somebody holds it.
+        Without an answer, or at a request to stop, it goes idle anyway; after an urgent
+        request at once.
         """
         loop_client = self.loop_client
         is_driven = loop_client.status.state in _DRIVEN
@@ -347,24 +347,24 @@ class ConsoleLoop:
         try:
             if loop_client.status.state in {ArmState.FLOAT, ArmState.GUIDE}:
                 loop_client.request(ArmState.HOLD)
-            loop_client.advance(_STANDS)
+            loop_client.advance(_SETTLE_SECONDS)
             if loop_client.status.state is ArmState.DAMP:
                 self.console.say(_DAMPED)
-                if not self._await_hand(Prompt.DAMPED, lambda: True):
+                if not self._await_confirmation(Prompt.DAMPED, lambda: True):
                     return
-            if verdict is not None and verdict.fault in _LED_ASTRAY:
+            if verdict is not None and verdict.fault in _POSE_UNRELIABLE:
                 rest = None
             else:
                 loop_client.request(ArmState.GUIDE)
             self.console.say(_SUPPORT if rest is None else _LAY_DOWN)
-            self._await_hand(Prompt.LAY_DOWN, lambda: self._lies(rest))
+            self._await_confirmation(Prompt.LAY_DOWN, lambda: self._is_on_stand(rest))
         except ArmFaultError as fault:  # the arm is idled at once
             self.console.problem(fault_words(fault.verdict))
         except TractionError:
-            return  # the arm is not under control: it is idled at once
+            return  # no control of the arm: it is idled at once
 
-    def _await_hand(self, prompt: Prompt, is_done: Callable[[], bool]) -> bool:
-        """Return whether the operator says so and it is done, not stopped, in time."""
+    def _await_confirmation(self, prompt: Prompt, is_done: Callable[[], bool]) -> bool:
+        """Return whether the operator confirms in time and `is_done` holds."""
         requests = self.stop.count
         for _ in range(round(LAY_DOWN_SECONDS / TICK)):
             state = self._advance(prompt, None)
@@ -374,29 +374,29 @@ class ConsoleLoop:
             is_stopped = self.stop.count > requests or self.stop.is_urgent
             if is_stopped or self.console.is_lost:
                 return False
-        self.console.say(_NOBODY)
+        self.console.say(_NO_ANSWER)
         return False
 
-    def _lies(self, rest: Sequence[float] | None) -> bool:
-        """Return whether the foot is on its stand, as far as that is known."""
+    def _is_on_stand(self, rest: Sequence[float] | None) -> bool:
+        """Return whether the foot is on its stand; True if the stand is unknown."""
         if rest is None:
             return True
         q = self.loop_client.latest()["position"][0]
-        apart = np.abs(q - np.array(rest))
-        joint = int(apart.argmax())
-        if apart[joint] <= _ON_STAND:
+        deviation = np.abs(q - np.array(rest))
+        joint = int(deviation.argmax())
+        if deviation[joint] <= _STAND_TOLERANCE:
             return True
         self.console.say(
-            f"Joint {joint + 1} is {apart[joint]:.2f} rad from where the foot lies on "
-            "its stand (arm.rest). Lay it there, then [i]dle; Ctrl-C: idle all the "
+            f"Joint {joint + 1} is {deviation[joint]:.2f} rad from where the foot lies "
+            "on its stand (arm.rest). Lay it there, then [i]dle; Ctrl-C: idle all the "
             "same."
         )
         return False
 
     def make_safe(self) -> bool:
-        """Idle the arm and abandon an open file; return whether idle is confirmed.
+        """Idle the arm and abandon an open file; returns whether idle is confirmed.
 
-        What the loop finds in that is told: a puck may have missed it.
+        Faults of the loop meanwhile are printed: a puck may have missed the command.
         """
         backend = self.rig.backend
         backend.recorder.abandon()

@@ -1,4 +1,4 @@
-"""What the parts of a session's flow share: rig, operator, journal, progress."""
+"""Context shared by the steps of a session: rig, operator, journal, progress."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
@@ -22,17 +22,17 @@ from experiments.session.journal import Journal
 from experiments.session.sidecar import KEEP, REJECT, TrialName
 from experiments.session.states import Event
 
-UNDO_NS = 10_000_000_000  # a verdict can be taken back for so long [ns]
+UNDO_NS = 10_000_000_000  # time to undo a verdict [ns]
 
 
 @dataclass(frozen=True, slots=True)
 class GivenVerdict:
-    """A verdict that was just given.
+    """The newest verdict.
 
     Attributes:
-        name: of the attempt.
-        is_kept: it was kept, not rejected.
-        text: the verdict in words.
+        name: name of the attempt.
+        is_kept: kept, not rejected.
+        text: the verdict as text.
     """
 
     name: TrialName
@@ -42,18 +42,17 @@ class GivenVerdict:
 
 @dataclass(slots=True)
 class FlowState:
-    """What changes while the session is open, and which step of the flow changes it.
+    """State of an open session; each attribute names the step that sets it.
 
     Attributes:
-        fault_context: where in the session a fault would occur now; every step that
-            waits for a person sets it.
-        page: the newest review, line by line; of `say_page`.
-        is_last: no trial begins after this one; of `ready` and `verdicts`.
-        estimate: expected duration, as of the first kept trial [s]; of
+        fault_context: current step, for the message of a fault; set by every step that
+            waits for a person.
+        page: lines of the newest review; set by `say_page`.
+        is_last: no further trial after this one; set by `ready` and `verdicts`.
+        estimate: expected duration, as of the first kept trial [s]; set by
             `update_estimate`.
-        ticked: numbers of the steps of the reset that were ticked; of `ready`, cleared
-            by `record`.
-        given: the newest verdict, None before the first or after it was taken back; of
+        ticked: numbers of the ticked reset steps; set by `ready`, cleared by `record`.
+        given: newest verdict, None before the first or after an undo; set by
             `open_undo` and `close_undo`.
     """
 
@@ -67,20 +66,20 @@ class FlowState:
 
 @dataclass(frozen=True, slots=True)
 class RunServices:
-    """What the steps of one opening of a session act with; none of it is replaced.
+    """Fixed services for the steps of one opening of a session.
 
     Attributes:
-        console_loop: lets time pass.
+        console_loop: the console's cycle.
         rig: the rig, its loop running.
-        console: where everything is printed.
+        console: output.
         operator: answers the prompts.
         stop: requests to stop.
-        metadata: of the session.
+        metadata: metadata of the session.
         journal: events and state.
         archive: the trials' files.
         feedback: sounds and speech.
-        opened_ns: when it was opened [ns].
-        kept_before: how many trials were kept until then.
+        opened_ns: time of the opening [ns].
+        kept_before: number of trials kept until then.
     """
 
     console_loop: ConsoleLoop
@@ -102,18 +101,18 @@ class RunServices:
 
     @property
     def elapsed(self) -> float:
-        """How long it has been open [s]."""
+        """Time since the opening [s]."""
         return (self.rig.clock.now_ns() - self.opened_ns) * 1e-9
 
     @property
     def time_left(self) -> float | None:
-        """Expected time for the missing trials [s]; None before the first kept one."""
+        """Expected time for the missing trials [s]; None before the first is kept."""
         kept = len(self.journal.state.kept) - self.kept_before
         missing = self.journal.state.wanted - len(self.journal.state.kept)
         return self.elapsed / kept * missing if kept > 0 else None
 
     def await_trial(self) -> None:
-        """Let the arm float in the hand that puts it down, until a trial begins."""
+        """Let the arm float, so that the operator can put the foot down."""
         self.loop_client.request(ArmState.FLOAT)
 
     def say(self, text: str) -> None:
@@ -121,22 +120,22 @@ class RunServices:
         self.console.say(text)
 
     def say_keys(self, prompt: Prompt) -> None:
-        """Print the keys of `prompt`, none of them broken."""
+        """Print the keys of `prompt`, wrapped between keys."""
         self.say(packed(screen_keys(prompt), self.console.width))
 
     def report_error(self, error: TractionError) -> None:
-        """Print an error, and what is safe."""
+        """Print an error, and how many trials are safe."""
         self.console.problem(f"{error} {self.journal.saved()}")
 
     def watch_foot(self) -> FootKeys:
-        """Return the double tap of the foot as a key, if rig.toml wants it."""
+        """Return a detector of double taps of the foot, if enabled in rig.toml."""
         is_wanted = self.rig.settings.rig.operator.double_tap
         return FootKeys(self.loop_client, is_wanted=is_wanted)
 
     def append(self, event: Event, **details: object) -> None:
         """Append an event to the journal while the console's heartbeat goes on.
 
-        A slow disk must not keep the console from watching the arm.
+        The console keeps watching the arm even if the disk is slow.
 
         Raises:
             SessionError, TrialFileError: as `Journal.append`.
@@ -144,7 +143,7 @@ class RunServices:
         self.console_loop.run_aside(lambda: self.journal.append(event, **details))
 
     def record_verdict(self, event: Event, name: TrialName, reason: str) -> None:
-        """Append a verdict to the journal; the files of the trial follow it."""
+        """Append a verdict to the journal, which updates the files of the trial."""
         self.append(
             event,
             trial=name.number,
@@ -163,7 +162,7 @@ class RunContext(RunServices):
     """One opening of a session, from activation to the arm at rest.
 
     Attributes:
-        state: what changes meanwhile.
+        state: its changing state.
     """
 
     state: FlowState = field(default_factory=FlowState)
@@ -175,11 +174,11 @@ class RunContext(RunServices):
             self.say(line)
 
     def report_fault(self, verdict: GuardVerdict) -> None:
-        """Print why the guard stopped the arm, and what is safe."""
+        """Print `fault_text` of a verdict."""
         self.console.problem(self.fault_text(verdict))
 
     def fault_text(self, verdict: GuardVerdict) -> str:
-        """Return why the guard stopped the arm, and what is safe."""
+        """Message on why the guard stopped the arm, and on what is safe."""
         bus = self.loop_client.loop.bus_condition
         faults = self.console_loop.faults
         is_rehearsed = faults is not None and faults.are_any
@@ -196,10 +195,10 @@ class RunContext(RunServices):
         return fault_text(verdict, context, self.journal.saved())
 
     def clear_faults(self, fault: ArmFaultError) -> None:
-        """Report a fault after which the arm holds, and go on.
+        """Report a fault that leaves the arm holding, and clear it.
 
         Raises:
-            ArmFaultError: no trial can follow: the arm is not under control.
+            ArmFaultError: the arm is not under control: no trial can follow.
         """
         verdict = self.console_loop.worst_verdict(fault.verdict)
         if verdict.ends_session:
@@ -208,13 +207,13 @@ class RunContext(RunServices):
         self.console_loop.clear_faults(verdict)
 
     def update_estimate(self) -> None:
-        """Estimate the duration once, when the first trial is kept."""
+        """Estimate the duration once, after the first kept trial."""
         left = self.time_left
         if self.state.estimate is None and left is not None:
             self.state.estimate = self.elapsed + left
 
     def open_undo(self, name: TrialName, reason: str, *, is_kept: bool) -> None:
-        """Say which verdict was given; from now on it can be taken back for 10 s."""
+        """Print the verdict given and allow its undo for 10 s."""
         text = f"{name.kept} kept" if is_kept else f"{name.kept} rejected: {reason}"
         if self.state.is_last:  # the session ends now
             self.state.given = None
@@ -227,10 +226,10 @@ class RunContext(RunServices):
     def change_verdict(
         self, given: GivenVerdict, *, is_kept: bool, reason: str
     ) -> None:
-        """Put another verdict in the place of a given one; the same changes nothing.
+        """Replace a given verdict; an equal one changes nothing.
 
-        It is one entry of the journal: where the program dies before it, what was
-        given stands, and no kept trial is lost.
+        The change is one entry of the journal: if the program dies before it, the given
+        verdict stands, and no kept trial is lost.
         """
         name = given.name
         if is_kept and given.is_kept:
@@ -247,16 +246,16 @@ class RunContext(RunServices):
         self.open_undo(name, reason, is_kept=is_kept)
 
     def close_undo(self) -> GivenVerdict | None:
-        """Return the newest verdict; it cannot be taken back any more."""
+        """Return the newest verdict and end its undo."""
         given, self.state.given = self.state.given, None
         self.console_loop.undo_until_ns = 0
         return given
 
 
 def busy_load(rig: Rig, *, is_rehearsed: bool) -> ComputerLoad | None:
-    """Return the computer's load where it makes a simulation late, else None.
+    """Return the computer's load if it explains a late simulation, else None.
 
-    That is on the wall clock, where no fault was asked for and programs wait for cores.
+    Only for a simulation in real time without planned faults, on overloaded cores.
     """
     if not rig.is_simulated or rig.is_stepped or is_rehearsed:
         return None
@@ -269,7 +268,7 @@ def open_context(
     metadata: SessionMetadata,
     journal: Journal,
 ) -> RunContext:
-    """Return the context of a session that is opened now."""
+    """Return the context of a session opened now."""
     rig, console = console_loop.rig, console_loop.console
     return RunContext(
         console_loop=console_loop,

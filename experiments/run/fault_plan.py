@@ -1,4 +1,4 @@
-"""Which faults a rehearsal injects, and when."""
+"""Plan of the faults that a rehearsal injects, with their times."""
 
 import re
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from experiments.run.host_faults import COMPUTER_FAULTS, HostFaults
 _PATTERN = re.compile(
     r"^(?P<name>[a-z0-9-]+)(@T(?P<trial>\d+)\+(?P<seconds>\d+(\.\d+)?)s?)?$"
 )
-# What the preflight is there to find.
+# Faults that the preflight detects.
 AT_PREFLIGHT = frozenset(
     {"can-down", "ft-silent", "locked", "not-zeroed"}
     | {"puck-missing", "puck-hot", "puck-error"}
@@ -21,24 +21,24 @@ AT_PREFLIGHT = frozenset(
 
 
 class FaultTrigger(Enum):
-    """What a fault comes into, and from which its seconds are counted."""
+    """Step in which a fault occurs, and whose start is its time origin."""
 
     TARE = "tare"
     RECORDING = "recording"
 
 
 _AT_TARE = frozenset({"tare-moved", "residual"})
-_USUALLY_AFTER = {FaultTrigger.TARE: 0.0, FaultTrigger.RECORDING: 2.0}  # s
+_DEFAULT_SECONDS = {FaultTrigger.TARE: 0.0, FaultTrigger.RECORDING: 2.0}  # s
 
 
 @dataclass(frozen=True, slots=True)
 class FaultPlan:
-    """A fault and its moment.
+    """A planned fault.
 
     Attributes:
-        name: as in the message catalogue.
-        trial: number of the trial it comes in; 0 = before the preflight.
-        seconds: after the start of the recording, or of the tare before it.
+        name: name as in the message catalogue.
+        trial: number of the trial; 0 = before the preflight.
+        seconds: time after the start of the recording, or of the tare before it [s].
     """
 
     name: str
@@ -47,23 +47,23 @@ class FaultPlan:
 
     @property
     def moment(self) -> FaultTrigger:
-        """What it comes into."""
+        """Step in which the fault occurs."""
         return FaultTrigger.TARE if self.name in _AT_TARE else FaultTrigger.RECORDING
 
     def to_text(self) -> str:
-        """Return it as it is written on the command line."""
+        """Return the fault as on the command line."""
         return f"{self.name}@T{self.trial}+{self.seconds:g}s"
 
 
 @dataclass(slots=True)
 class PlannedFaults:
-    """The faults of a rehearsal, injected one by one when they are due.
+    """Planned faults of a rehearsal, injected when due.
 
     Attributes:
-        plans: those that have not come yet.
-        devices: what fails in the simulated rig.
-        host_faults: what fails in the computer.
-        are_any: whether any was asked for, come or not.
+        plans: pending faults.
+        devices: injects faults of the simulated rig.
+        host_faults: injects faults of the computer.
+        are_any: whether any fault was planned, pending or not.
     """
 
     plans: list[FaultPlan]
@@ -75,14 +75,14 @@ class PlannedFaults:
         self.are_any = bool(self.plans)
 
     def inject_due(self, moment: FaultTrigger, trial: int, seconds: float) -> None:
-        """Inject what is due `seconds` after the beginning of a moment in `trial`."""
+        """Inject the faults due `seconds` after the start of a step of `trial`."""
         for plan in [p for p in self.plans if (p.trial, p.moment) == (trial, moment)]:
             if seconds >= plan.seconds:
                 self.plans.remove(plan)
                 self._inject(plan)
 
     def inject_first(self) -> None:
-        """Inject those that come before the preflight."""
+        """Inject the faults planned before the preflight."""
         for plan in [plan for plan in self.plans if plan.trial == 0]:
             self.plans.remove(plan)
             self._inject(plan)
@@ -95,10 +95,10 @@ class PlannedFaults:
 
 
 def parse_fault(text: str, known: Sequence[str]) -> FaultPlan:
-    """Return the plan of `NAME[@Tn+SECONDSs]`.
+    """Parse `NAME[@Tn+SECONDSs]`.
 
     Raises:
-        SettingsError: the text is not of that form, or the name is unknown.
+        SettingsError: the text is malformed, or the name unknown.
     """
     match = _PATTERN.match(text)
     if match is None or match["name"] not in known:
@@ -114,13 +114,13 @@ def parse_fault(text: str, known: Sequence[str]) -> FaultPlan:
     if name in AT_PREFLIGHT:
         return FaultPlan(name, 0, 0.0)
     plan = FaultPlan(name, 1, 0.0)
-    return FaultPlan(name, 1, _USUALLY_AFTER[plan.moment])
+    return FaultPlan(name, 1, _DEFAULT_SECONDS[plan.moment])
 
 
 def plan_faults(
     texts: Sequence[str], simulation: SimulationControl | None, host_faults: HostFaults
 ) -> PlannedFaults | None:
-    """Return the faults of a rehearsal; those of the preflight are injected at once.
+    """Plan the faults of a rehearsal; injects those of the preflight at once.
 
     Raises:
         SettingsError: as `parse_fault`.

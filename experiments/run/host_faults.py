@@ -15,20 +15,20 @@ from experiments.session.lock import LOCK_FILE, sign
 from experiments.session.store import SessionFolder
 
 COMPUTER_FAULTS = ("bug", "crash", "disk-full", "locked", "write-failed")
-_ALMOST_NOTHING = 2_100_000_000  # bytes free, less than any session is allowed
-_ROOM = 4096  # bytes that a full disk still takes of a running trial
+_TOO_FEW_BYTES = 2_100_000_000  # bytes, less than any session requires
+_ROOM = 4096  # bytes of a running trial that still fit on a full disk
 
 
 class InjectedBugError(Exception):
-    """A bug that was asked for."""
+    """A planned bug."""
 
 
 @dataclass(slots=True)
 class HostFaults:
-    """Injects faults of the computer; `restore` ends them all.
+    """Injects faults of the computer; `restore` removes them.
 
     Attributes:
-        rig: whose recorder is hit.
+        rig: rig with the recorder that fails.
     """
 
     rig: Rig
@@ -38,7 +38,7 @@ class HostFaults:
     _restore: ExitStack = field(default_factory=ExitStack, init=False)
 
     def inject(self, name: str, trial: int) -> None:
-        """Inject a fault while `trial` is recorded, or before the preflight (0)."""
+        """Inject a fault during `trial`, or before the preflight (0)."""
         if name == "crash":
             os.kill(os.getpid(), signal.SIGKILL)
         elif name == "locked":
@@ -53,19 +53,19 @@ class HostFaults:
             raise InjectedBugError("rehearsed")
 
     def restore(self) -> None:
-        """End what has not ended by itself; safe to repeat."""
+        """Remove all faults; safe to repeat."""
         self._restore.close()
 
     def free_bytes(self, folder: Path) -> int:
-        """Return how much room is left where `folder` is [bytes]; a `DiskProbe`."""
-        return _ALMOST_NOTHING if self._is_disk_full else free_bytes(folder)
+        """Free space on the disk of `folder` [bytes]; a `DiskProbe`."""
+        return _TOO_FEW_BYTES if self._is_disk_full else free_bytes(folder)
 
     def enter_session(self, folder: SessionFolder) -> None:
-        """Let faults hit the files of the session in `folder` from here on."""
+        """Set the session whose files the faults damage."""
         self._folder = folder
 
     def hold_lock(self, folder: SessionFolder) -> None:
-        """Hold the lock of a new session, as another process would, if planned."""
+        """Hold the lock of a new session as another process would, if planned."""
         if self._is_locked:
             self._restore.enter_context(_occupied(folder.path / LOCK_FILE))
 
@@ -76,7 +76,7 @@ class HostFaults:
 
 @contextmanager
 def _occupied(path: Path) -> Generator[None]:
-    """Hold a lock through a description of its own: a lock belongs to the open file."""
+    """Hold a lock through a separate open file description, which owns it."""
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
     try:
         wait_for_lock(descriptor)
@@ -88,10 +88,10 @@ def _occupied(path: Path) -> Generator[None]:
 
 @contextmanager
 def _full_disk(rig: Rig, path: Path) -> Generator[None]:
-    """Let no file of the process that records grow beyond what `path` has now.
+    """Limit the file size of the recorder process to the present size of `path`.
 
-    The kernel then refuses to write, as it does on a full disk. Journal and sidecars
-    are far smaller and stay writable, as the last blocks of a disk often are.
+    The kernel then refuses writes as on a full disk. Journal and sidecars are far
+    smaller and stay writable, as the last blocks of a disk often do.
     """
     number = rig.backend.recorder_pid
     before = resource.prlimit(number, resource.RLIMIT_FSIZE)
@@ -101,11 +101,13 @@ def _full_disk(rig: Rig, path: Path) -> Generator[None]:
     try:
         yield
     finally:
-        _quietly(lambda: resource.prlimit(number, resource.RLIMIT_FSIZE, before))
+        _ignore_ended_process(
+            lambda: resource.prlimit(number, resource.RLIMIT_FSIZE, before)
+        )
 
 
-def _quietly(action: Callable[[], object]) -> None:
-    """Do something to a process that may have gone."""
+def _ignore_ended_process(action: Callable[[], object]) -> None:
+    """Act on a process that may have ended."""
     try:
         action()
     except ProcessLookupError:
@@ -113,7 +115,7 @@ def _quietly(action: Callable[[], object]) -> None:
 
 
 def _flip_a_bit(path: Path) -> None:
-    """Change one bit in the middle of what the disk has of a running trial."""
+    """Flip one bit in the middle of the file of a running trial."""
     with path.open("r+b") as file:
         offset = path.stat().st_size // 2
         file.seek(offset)

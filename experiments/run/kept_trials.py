@@ -1,4 +1,4 @@
-"""What a session shows of its kept trials while it runs: table and traces."""
+"""Table and traces of the kept trials, for a running session."""
 
 from collections.abc import Mapping
 from typing import Any, cast
@@ -11,37 +11,37 @@ from experiments.operator.graphs import KeptRow, WayTrace
 from experiments.session.derivation import kept_sidecars
 from experiments.session.store import SessionFolder
 
-TRACE_CELLS = 72  # shares of the way in a trace
+TRACE_CELLS = 72  # sections of the travel in a trace
 
 
 def traces_of(trial: RecordedTrial) -> tuple[WayTrace, ...]:
-    """Return the largest F_t and v_t in every share of the way, shape (72,) each."""
+    """Largest |F_t| and |v_t| in every section of the travel, shape (72,) each."""
     share = trial.displacement / trial.frame.travel
     cells = np.floor(share * TRACE_CELLS).astype(int)
     traces: list[WayTrace] = []
     for name, unit, column in (("F_t", "N", 1), ("v_t", "m/s", 0)):
         values = np.full(TRACE_CELLS, np.nan)
-        known = np.abs(trial.traction[:, column])
-        is_inside = (cells >= 0) & (cells < TRACE_CELLS) & np.isfinite(known)
-        np.fmax.at(values, cells[is_inside], known[is_inside])
+        values_abs = np.abs(trial.traction[:, column])
+        is_inside = (cells >= 0) & (cells < TRACE_CELLS) & np.isfinite(values_abs)
+        np.fmax.at(values, cells[is_inside], values_abs[is_inside])
         traces.append(WayTrace(name, unit, values))
     return tuple(traces)
 
 
 def plain_trace(trace: WayTrace) -> list[float | None]:
-    """Return the values of a trace for JSON, None where no sample is."""
+    """Return the values of a trace for JSON, None without a sample."""
     return [round(v, 4) if np.isfinite(v) else None for v in trace.values.tolist()]
 
 
 def trace_values(value: object) -> NDArray[np.float64]:
-    """Return a trace as it stands in a sidecar, empty where it is none."""
+    """Parse a trace of a sidecar, shape (n,); empty if it is malformed."""
     entries = cast("list[object]", value) if isinstance(value, list) else []
     is_trace = all(x is None or type(x) in (int, float) for x in entries)
     return np.array([np.nan if x is None else x for x in entries] * is_trace, float)
 
 
 def kept_rows(folder: SessionFolder) -> tuple[KeptRow, ...]:
-    """Return the rows of the running table of kept trials, oldest first."""
+    """Rows of the table of kept trials, oldest first."""
     return tuple(_kept_row(sidecar) for sidecar in kept_sidecars(folder))
 
 
@@ -67,13 +67,13 @@ def _number_or_none(value: object) -> float | None:
 
 
 def kept_ratios(folder: SessionFolder) -> list[float]:
-    """Return the quick fits of the trials kept so far."""
+    """Quick fits F_t/F_n of the trials kept so far."""
     ratios = (sidecar.get("ratio") for sidecar in kept_sidecars(folder))
     return [ratio for ratio in ratios if isinstance(ratio, float)]
 
 
 def kept_traces(folder: SessionFolder) -> list[dict[str, NDArray[np.float64]]]:
-    """Return the traces of the trials kept so far by quantity."""
+    """Traces of the trials kept so far, by quantity."""
     kept = (sidecar.get("traces") for sidecar in kept_sidecars(folder))
-    known = (cast("dict[str, object]", one) for one in kept if isinstance(one, dict))
-    return [{name: trace_values(v) for name, v in one.items()} for one in known]
+    entries = (cast("dict[str, object]", e) for e in kept if isinstance(e, dict))
+    return [{name: trace_values(v) for name, v in e.items()} for e in entries]

@@ -1,4 +1,4 @@
-"""An arm that walks through poses by itself while a person keeps out of its way."""
+"""Automatic motion of the arm through measurement poses."""
 
 from collections.abc import Callable, Sequence
 
@@ -16,58 +16,58 @@ from wam.calibration.poses import APPROACH_SPEED, MeasurementPose, travel_time
 from wam.control.position_control import JointMove, move_reference
 from wam.model.constants import Array
 
-WEIGHED = 0.3  # s of readings of the free foot
+WEIGHED = 0.3  # s, duration of a reading of the free foot
 SETTLE = 0.5  # s after a move
 STILL = 0.02  # rad/s, largest joint speed while something is averaged
-# rad, how far a joint may be from its place in a move; gravity that is off by a quarter
-# and the friction of another arm make 12 mrad.
+# rad, tolerance of the joints during a move; a gravity error of a quarter and the
+# friction of another arm cause 12 mrad.
 ASTRAY = np.array([0.04, 0.04, 0.04, 0.04, 0.04, 0.04, 0.1])
-# N on the foot beyond its weight, while nothing may touch it. A foot of 1 kg that the
-# sensor sees turned by 5 degrees makes 1.7.
+# N, limit of the force on a free foot beyond its weight. A foot of 1 kg on a sensor
+# mounted 5 degrees off causes 1.7 N.
 TOUCH = 3.0
-ATTEMPTS = 4  # at an arm that does not come to rest
+ATTEMPTS = 4  # to find the arm at rest
 
 HaltPlan = Callable[[Array, FreeSpace], Sequence[MeasurementPose]]
 
 
 class MoveStoppedError(ArmFaultError):
-    """The guard stopped the arm in a move that it made by itself."""
+    """The guard stopped the arm in an automatic move."""
 
 
 class PoseWalk:
-    """Moves the arm from halt to halt and knows where it was sent last.
+    """Moves the arm from halt to halt.
 
-    At 0.5 rad/s and 0.3 m/s at most, after the operator has confirmed that the space
-    is clear.
+    At most 0.5 rad/s and 0.3 m/s, after the operator has confirmed that the space is
+    clear.
     """
 
     def __init__(self, console_loop: ConsoleLoop, *, is_free: bool = False) -> None:
-        """Go nowhere yet.
+        """Prepare a walk without moving.
 
         Args:
-            console_loop: of the rig.
-            is_free: what is measured is wrong if something touches the foot; the wrist
-                sensor, which is known already, tells.
+            console_loop: console loop of the rig.
+            is_free: whether nothing may touch the foot during measurements; checked
+                with the calibrated wrist sensor.
         """
         self.console_loop = console_loop
         self._rig = console_loop.rig
         self._console = console_loop.console
-        self._here = np.zeros(7)
+        self._target = np.zeros(7)
         self._is_free = is_free
         self._is_weighed = False
 
     def begin(
         self, plan: HaltPlan, seconds_per_pose: float
     ) -> Sequence[MeasurementPose]:
-        """Plan the way of an activated arm and ask for free space; return the halts.
+        """Plan the path of an activated arm and ask for free space; returns the halts.
 
         Args:
-            plan: returns the halts, from where the arm is (7,) [rad] and where it may
-                move.
-            seconds_per_pose: how long the arm stops in each pose [s].
+            plan: returns the halts, given the position of the arm (7,) [rad] and the
+                free space.
+            seconds_per_pose: duration of the stop in each pose [s].
 
         Raises:
-            SettingsError: no safe way.
+            SettingsError: there is no safe path.
             StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
         """
         start = self._rig.backend.loop_client.latest()["position"][0].copy()
@@ -75,8 +75,8 @@ class PoseWalk:
         halts = self.console_loop.run_aside(lambda: plan(start, space))
         number = len({halt.pose for halt in halts} - {None})
         stops = len(halts) * SETTLE + number * seconds_per_pose
-        # Held by position: the weight may not be known yet, and the hand lets go.
-        self._here = start
+        # Position control: the weight may not be known yet, and the operator lets go.
+        self._target = start
         self.go_to(MeasurementPose(start, APPROACH_SPEED, None))
         self.ask(
             f"The arm will move by itself through {number} poses, about "
@@ -88,9 +88,9 @@ class PoseWalk:
         return halts
 
     def _weigh_foot(self) -> None:
-        """Take what the sensor shows while nothing touches the foot.
+        """Tare the sensor while nothing touches the foot.
 
-        From here on the guard sees what the arm meets in its moves.
+        From here on the guard detects contact during moves.
         """
         loop_client = self._rig.backend.loop_client
         reader = loop_client.wrenches()
@@ -114,26 +114,26 @@ class PoseWalk:
 
         Raises:
             MoveStoppedError: the guard stopped the move.
-            PreflightError: a joint is not where it was sent; the arm is idled then.
+            PreflightError: a joint is off its target; the arm is idled.
             StopRequestedError: as `ConsoleLoop.tick`.
         """
-        move = JointMove(self._here, halt.q, halt.speed)
+        move = JointMove(self._target, halt.q, halt.speed)
         self._rig.backend.loop_client.move_to(halt.q.tolist(), halt.speed)
         sent_ns = self._rig.clock.now_ns()
         try:
             for _ in range(round((move.duration + SETTLE) / TICK) + 1):
                 self.console_loop.tick(Prompt.MOVING)
-                self._check_on_the_way(move, sent_ns)
+                self._check_move(move, sent_ns)
         except ArmFaultError as fault:
             raise MoveStoppedError(fault.verdict) from fault
-        self._here = halt.q
+        self._target = halt.q
         self._require_free(WEIGHED)
 
     def _require_free(self, seconds: float) -> None:
         """Refuse to go on while something pushes the foot; the arm is idled then.
 
         Raises:
-            PreflightError: the wrist sensor shows more than the foot's weight.
+            PreflightError: the wrist sensor measures more than the foot's weight.
         """
         if not (self._is_free and self._is_weighed):
             return
@@ -150,35 +150,35 @@ class PoseWalk:
             arm_state=IDLE_ARM,
         )
 
-    def _check_on_the_way(self, move: JointMove, sent_ns: int) -> None:
-        """Idle an arm that something holds up, or whose encoder stands still.
+    def _check_move(self, move: JointMove, sent_ns: int) -> None:
+        """Idle an arm that is blocked, or whose encoder is dead.
 
-        A joint with a dead encoder is pulled on for ever and seems to stand.
+        A joint with a dead encoder is driven on for ever and seems to stand still.
         """
         loop_client = self._rig.backend.loop_client
         if loop_client.status.verdict is not None:
-            return  # the guard has stopped the move; the next tick says why
+            return  # the guard has stopped the move; the next tick raises its fault
         record = loop_client.latest()[0]
         wanted, _ = move_reference(move, (int(record["host_ns"]) - sent_ns) * 1e-9)
-        apart = np.abs(record["position"] - wanted)
-        joint = int((apart / ASTRAY).argmax())
-        if apart[joint] <= ASTRAY[joint]:
+        deviation = np.abs(record["position"] - wanted)
+        joint = int((deviation / ASTRAY).argmax())
+        if deviation[joint] <= ASTRAY[joint]:
             return
         self.console_loop.make_safe()
         raise PreflightError(
-            f"Joint {joint + 1} is {apart[joint]:.3f} rad from where it was sent "
+            f"Joint {joint + 1} is {deviation[joint]:.3f} rad from where it was sent "
             f"(limit {ASTRAY[joint]:g}).",
             hint="Is something in the way, or has an encoder failed?",
             arm_state=IDLE_ARM,
         )
 
     def end(self) -> None:
-        """Have the arm supported and idle it: it sinks then."""
+        """Ask the operator to support the arm, then idle it: it sinks."""
         self.console_loop.lay_down()
         self.console_loop.make_safe()
 
     def rest(self, seconds: float) -> tuple[Array, Array]:
-        """Return mean (positions [rad], torques [N m]) of `seconds` at rest, (7,) each.
+        """Mean (positions [rad], torques [N m]) over `seconds` at rest, (7,) each.
 
         Raises:
             PreflightError: the arm does not come to rest, or something pushes the foot.
@@ -199,7 +199,7 @@ class PoseWalk:
         )
 
     def ask(self, text: str, prompt: Prompt) -> None:
-        """Say `text` and wait for the key that confirms it."""
+        """Print `text` and wait for the key that confirms it."""
         self._console.say(text)
         while (
             key_action(prompt, self.console_loop.tick(prompt)) is not KeyAction.CONFIRM
@@ -207,6 +207,6 @@ class PoseWalk:
             pass
 
     def wait(self, seconds: float) -> None:
-        """Let `seconds` pass."""
+        """Run the console loop for `seconds`."""
         for _ in range(round(seconds / TICK) + 1):
             self.console_loop.tick(Prompt.MOVING)

@@ -1,6 +1,6 @@
-"""The quality gate: what a trial is worth, while the terrain can still be seen.
+"""Quality gate: review of a trial before the terrain is reset.
 
-And which cell of speed and load the kept ones leave thin.
+Also names the cell of speed and load with the fewest samples of the kept trials.
 """
 
 from collections.abc import Mapping, Sequence
@@ -41,20 +41,20 @@ from experiments.session.derivation import kept_sidecars
 from experiments.session.store import SessionFolder
 
 STALE_SHARE = 0.01  # of the cycles
-ENOUGH_EARLIER = 3  # trials before which nothing is odd
+ENOUGH_EARLIER = 3  # trials needed to call another one an outlier
 ODD = 3.0  # standard deviations
 LEAST_SPREAD = 0.05  # of the mean; few trials may agree by chance
-CELLS = (4, 4)  # speeds, loads of a coverage
-MANY = 1_000_000_000  # samples, more than any trial has
+CELLS = (4, 4)  # speed and load cells of a coverage
+MANY = 1_000_000_000  # samples, limit of a plausible count
 
 
 @dataclass(frozen=True, slots=True)
 class Review:
-    """Numbers of one trial for the review page.
+    """Figures of one trial for the review page.
 
     Attributes:
         worst_gap: longest time between two cycles [s].
-        missed: cycles that are missing.
+        missed: number of missing cycles.
         joint7: largest motion of joint 7 [rad].
         saturated: share of the cycles in which the force sensor was saturated.
         stale: share of the cycles without a fresh force sample.
@@ -63,10 +63,10 @@ class Review:
         slips: number of slips.
         ratio: slope of F_t over F_n of the kept samples; NaN without load.
         counts: samples per speed and load, shape (4, 4), see analysis.data.quality.
-        doubts: why velocity and forces cannot be right; empty if they can.
-        lag: how late the forces are; None where the trial does not show it.
+        doubts: reasons why velocity or forces are implausible.
+        lag: lag of the forces; None if the trial does not determine it.
         v_t: median velocity of the kept samples [m/s]; NaN without any.
-        traces: F_t and v_t over the way along the container.
+        traces: F_t and v_t over the travel along the container.
     """
 
     worst_gap: float
@@ -86,11 +86,11 @@ class Review:
 
     @property
     def known_ratio(self) -> float | None:
-        """The slope, None where there is none."""
+        """The slope, None if it is NaN."""
         return self.ratio if np.isfinite(self.ratio) else None
 
     def plain(self) -> dict[str, object]:
-        """Return what the running table and later reviews need, for the journal."""
+        """Return the figures for the journal, used by the table and later reviews."""
         return {
             "ratio": self.known_ratio,
             "coverage": self.counts.tolist(),
@@ -102,12 +102,12 @@ class Review:
     def trace_lines(
         self, kept: Sequence[Mapping[str, NDArray[np.float64]]], name: str, width: int
     ) -> list[str]:
-        """Return the traces in `width` columns, beside the median of the kept ones.
+        """Return the traces in `width` columns, with the median of the kept trials.
 
         Args:
             kept: values of the kept trials by quantity.
-            name: of this trial.
-            width: of the terminal [characters].
+            name: name of this trial.
+            width: width of the terminal [characters].
         """
         lines: list[str] = []
         for trace in self.traces:
@@ -119,7 +119,7 @@ class Review:
         """Return (mark, text) of every line.
 
         Args:
-            earlier: `ratio` of the trials kept before, for comparison.
+            earlier: `ratio` of the trials kept so far, for comparison.
         """
         timing = GOOD if self.worst_gap < 0.004 and not self.missed else WARNING
         joint7 = GOOD if self.joint7 < JOINT7_WARNING else WARNING
@@ -148,7 +148,7 @@ class Review:
         return next((doubt for doubt in self.doubts if doubt.name == name), None)
 
     def _lag_line(self) -> tuple[str, str]:
-        """Return (mark, words) on when the forces came, where the trial shows it."""
+        """Return (mark, text) on the lag of the forces."""
         if self.lag is None:
             return WARNING, "lag of the force not vouched for: no motion shows it"
         late = self.lag.seconds * 1e3
@@ -165,7 +165,7 @@ class Review:
         return "sensor no saturation"
 
     def _quick_fit(self, earlier: Sequence[float]) -> tuple[str, str]:
-        """Return (mark, words) on the slope, held against the earlier ones."""
+        """Return (mark, text) on the slope, compared with the earlier ones."""
         if np.isnan(self.ratio):
             return WARNING, "quick fit impossible: no load"
         words = f"quick fit F_t/F_n {self.ratio:.2f}"
@@ -173,20 +173,20 @@ class Review:
             return BAD, f"{words} cannot be: above 0 and at most {FRICTION[1]:g} can"
         if self.doubts:
             return WARNING, f"{words}, not vouched for"
-        known = [ratio for ratio in earlier if _is_friction(ratio)]
-        if len(known) < ENOUGH_EARLIER:
+        valid = [ratio for ratio in earlier if _is_friction(ratio)]
+        if len(valid) < ENOUGH_EARLIER:
             return GOOD, words
-        mean, spread = float(np.mean(known)), float(np.std(known, ddof=1))
-        is_odd = abs(self.ratio - mean) > ODD * max(spread, LEAST_SPREAD * mean)
-        words += f" ({len(known)} before: {mean:.2f} ± {spread:.2f})"
-        return WARNING if is_odd else GOOD, words
+        mean, spread = float(np.mean(valid)), float(np.std(valid, ddof=1))
+        is_outlier = abs(self.ratio - mean) > ODD * max(spread, LEAST_SPREAD * mean)
+        words += f" ({len(valid)} before: {mean:.2f} ± {spread:.2f})"
+        return WARNING if is_outlier else GOOD, words
 
 
 def review_trial(path: Path) -> Review:
-    """Return what the finished file says about the trial.
+    """Review a trial from its finished file.
 
     Raises:
-        TrialFileError: it cannot be read.
+        TrialFileError: `path` cannot be read.
     """
     trial = load_trial(path)
     prepared = prepare_trial(
@@ -215,7 +215,7 @@ def review_trial(path: Path) -> Review:
 
 
 def _is_friction(ratio: float) -> bool:
-    """Return whether a ground can have this F_t/F_n; none drives the foot."""
+    """Return whether F_t/F_n is possible: the ground never drives the foot."""
     return 0.0 < ratio <= FRICTION[1]
 
 
@@ -225,7 +225,7 @@ def _median_speed(prepared: PreparedTrial) -> float:
 
 
 def thin_so_far(folder: SessionFolder) -> str:
-    """Return the cell of speed and load that a session's kept trials leave thin."""
+    """Name the cell of speed and load with the fewest samples of a session."""
     counts = np.zeros(CELLS, np.int64)
     for sidecar in kept_sidecars(folder):
         counts += cells_of(sidecar.get("coverage"))
@@ -233,7 +233,7 @@ def thin_so_far(folder: SessionFolder) -> str:
 
 
 def cells_of(value: object) -> NDArray[np.int64]:
-    """Return a coverage as it stands in a sidecar, zeros where it is none."""
+    """Parse a coverage of a sidecar, shape (4, 4); zeros if it is malformed."""
     try:
         counts = np.array(value, np.int64)
     except (ValueError, TypeError, OverflowError):

@@ -1,4 +1,4 @@
-"""Before a trial: arm activated, terrain reset; notes, pauses, a look at the last."""
+"""Steps before a trial: activation, reset of the terrain, notes, pauses, review."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -19,16 +19,16 @@ from experiments.run.verdicts import take_note
 from experiments.session.sidecar import TrialName
 from experiments.session.states import Event
 
-PATIENCE = 120.0  # how long a person may take to activate the arm [s]
+PATIENCE = 120.0  # time to activate the arm [s]
 _READY_SECONDS = 0.1  # from the request for hold to its first torques
 
 
 def activate(console_loop: ConsoleLoop) -> None:
-    """Get torques ready, then wait for the pendant and for [space].
+    """Start the torques, then wait for the pendant and for [space].
 
     Raises:
-        PreflightError: no torques can be made ready, or the arm was not activated
-            within two minutes.
+        PreflightError: there are no torques, or the arm was not activated within two
+            minutes.
         StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
     """
     control, clock = console_loop.loop_client, console_loop.rig.clock
@@ -50,14 +50,14 @@ def activate(console_loop: ConsoleLoop) -> None:
 
 
 def _require_torques(console_loop: ConsoleLoop) -> None:
-    """Refuse to ask for the pendant while the arm would be active and fall.
+    """Refuse the activation of an arm without torques, which would fall.
 
-    Hold begins with a complete reading; without one no torque would be there.
+    Hold starts with a complete reading of all positions.
     """
     control = console_loop.loop_client
     loop = control.loop
     if loop.control.state is ArmState.HOLD or loop.control.verdict is not None:
-        return  # ready, or the next tick tells why not
+        return  # ready, or the next tick raises the fault
     if loop.control.safety is SafetyMode.E_STOP:
         raise preflight_error("no-power")
     silent = ~int(control.latest()["flags"][0]) >> MOTOR_FRESH_SHIFT & 0x7F
@@ -68,7 +68,7 @@ def _require_torques(console_loop: ConsoleLoop) -> None:
 
 
 def wait_ready(context: RunContext, name: TrialName) -> None:
-    """Wait until the trial is to begin, by key or by a double tap of the foot.
+    """Wait for the start of the trial, by key or by a double tap of the foot.
 
     Raises:
         ArmFaultError, StopRequestedError: as `ConsoleLoop.tick`.
@@ -90,7 +90,7 @@ def wait_ready(context: RunContext, name: TrialName) -> None:
 
 
 def ready_view(context: RunContext) -> ReadyView:
-    """Return what the screen between two trials shows now."""
+    """Return the present content of the screen between two trials."""
     state, row = context.journal.state, context.rig.row
     folder = context.metadata.folder
     thin = context.console_loop.run_aside(lambda: thin_so_far(folder))
@@ -113,7 +113,7 @@ def ready_view(context: RunContext) -> ReadyView:
 
 
 def _show(context: RunContext) -> None:
-    """Show the screen: it stays and goes on counting where there is a terminal."""
+    """Show the screen; on a terminal it is updated continuously."""
     view = ready_view(context)
     lines = [*ready_lines(view), screen_keys(Prompt.READY)]
     if not context.console.is_live:
@@ -121,7 +121,7 @@ def _show(context: RunContext) -> None:
             context.say(line)
         return
 
-    def now(width: int) -> list[str]:
+    def lines_now(width: int) -> list[str]:
         newer = replace(
             view,
             elapsed=context.elapsed,
@@ -130,11 +130,11 @@ def _show(context: RunContext) -> None:
         )
         return [*ready_lines(newer, width), screen_keys(Prompt.READY)]
 
-    context.console_loop.show(now)
+    context.console_loop.show(lines_now)
 
 
 def _note(services: RunServices, name: TrialName) -> None:
-    """Take a note on the session, the arm holding meanwhile."""
+    """Take a note on the session while the arm holds."""
     services.loop_client.request(ArmState.HOLD)
     take_note(services, name, is_on_trial=False)
     services.loop_client.request(ArmState.FLOAT)
@@ -153,14 +153,14 @@ def _pause(context: RunContext, name: TrialName) -> None:
                 pass
             is_over = True
         except ArmFaultError as fault:
-            context.clear_faults(fault)  # and there is no answer: the pause goes on
+            context.clear_faults(fault)  # the pause goes on
     context.state.fault_context = before
     context.append(Event.CONTINUED)
     context.await_trial()
 
 
 def _view_last(context: RunContext, name: TrialName) -> None:
-    """Say the newest review again, or that of the last kept trial on the disk."""
+    """Print the newest review again, or that of the last kept trial."""
     del name
     if not context.state.page:
         folder, kept = context.metadata.folder, context.journal.state.kept_trials
@@ -176,10 +176,10 @@ def _view_last(context: RunContext, name: TrialName) -> None:
 
 
 def _quit_after(context: RunContext, name: TrialName) -> None:
-    """Let the next trial be the last one; the second time, end now.
+    """Make the next trial the last one; the second time, end now.
 
     Raises:
-        StopRequestedError: it was asked for twice.
+        StopRequestedError: second request.
     """
     if context.state.is_last:
         raise StopRequestedError

@@ -1,4 +1,4 @@
-"""One trial on the loop: started, followed, ended, sealed, and what it is worth."""
+"""Recording of one trial: start, follow, end, seal, review."""
 
 from collections.abc import Callable, Mapping
 
@@ -41,7 +41,7 @@ _ALL_MOTORS = 0x7F << MOTOR_FRESH_SHIFT
 def recording_screen(
     rig: Rig, trial: str, outcome: TrialOutcome
 ) -> Callable[[int], list[str]]:
-    """Return what draws trial `trial`, whose `outcome` is kept up to date."""
+    """Return a view of the running trial `trial`; `outcome` is updated elsewhere."""
     loop_client, limits = rig.backend.loop_client, rig.settings.rig.guard_limits()
     window = PrepareOptions()
     scales = LiveScales(
@@ -72,23 +72,23 @@ def recording_screen(
     return lines
 
 
-LIVE_SECONDS = 5.0  # between two lines of a running trial
+LIVE_SECONDS = 5.0  # period of the lines of a running trial
 
 
 class TrialLostError(TractionError):
-    """A running trial that the disk did not take."""
+    """A running trial could not be written to the disk."""
 
     exit_code = 6
 
 
 def record_trial(context: RunContext, name: TrialName) -> TrialOutcome:
-    """Record until the trial is over; return how it ended.
+    """Record one trial to its end; returns its outcome.
 
-    An interrupted trial is rejected, its files sealed.
+    An interrupted trial is rejected and its files sealed.
 
     Raises:
-        ArmFaultError, StopRequestedError: it was interrupted.
-        TrialLostError: the disk is full or gone, or the file is not what was written.
+        ArmFaultError, StopRequestedError: the trial was interrupted.
+        TrialLostError: the disk is full or gone, or the file fails verification.
         ProcessLostError: a process has died.
     """
     header = trial_header(context.rig, context.metadata, name)
@@ -121,7 +121,7 @@ def record_trial(context: RunContext, name: TrialName) -> TrialOutcome:
 def _record(
     context: RunContext, name: TrialName, header: TrialHeader, outcome: TrialOutcome
 ) -> None:
-    """Record until the trial is over; `outcome` is kept up to date."""
+    """Record until the trial is over; updates `outcome`."""
     path = context.metadata.folder.trials / f"{name.kept}.mcap"
     recorder, console_loop = context.rig.backend.recorder, context.console_loop
     _set_aside(context, name.number)
@@ -144,14 +144,14 @@ def _record(
 
 
 def _set_aside(services: RunServices, number: int) -> None:
-    """Make room for the repetition of a kept trial."""
+    """Reject a kept trial that is about to be repeated."""
     attempt = services.journal.state.kept_attempt(number)
     if attempt:
         services.record_verdict(Event.SET_ASIDE, TrialName(number, attempt), "redone")
 
 
 def _follow(context: RunContext, name: TrialName, outcome: TrialOutcome) -> None:
-    """Let the trial run until it is over by itself or by key."""
+    """Follow the trial until its end condition or a key."""
     rig, console_loop = context.rig, context.console_loop
     start = rig.clock.now_ns()
     watch, pace = EndDetector(rig.frame.travel), PaceMonitor()
@@ -181,10 +181,10 @@ def _follow(context: RunContext, name: TrialName, outcome: TrialOutcome) -> None
 def _end(
     context: RunContext, name: TrialName, header: TrialHeader, outcome: TrialOutcome
 ) -> None:
-    """Seal the files, say what they are worth; an interrupted one is rejected."""
+    """Seal the files and print the review; rejects an interrupted trial."""
     archive, recorder = context.archive, context.rig.backend.recorder
     context.loop_client.watch_trial(is_recording=False)
-    context.loop_client.advance(TICK)  # the newest metadata is written down
+    context.loop_client.advance(TICK)  # writes the newest metadata
     devices = context.loop_client.device_metadata()
     recorder.event(20, "link", devices.get("link", ""))
     friction = _friction_lines(devices)
@@ -224,7 +224,7 @@ def _end(
 
 
 def _friction_lines(devices: Mapping[str, str]) -> list[str]:
-    """Return what to say of a compensation of friction that has ended itself."""
+    """Lines on a friction compensation that has switched itself off."""
     motor = devices.get(SWUNG_MOTOR, "0")
     if motor == "0":
         return []
@@ -237,7 +237,7 @@ def _friction_lines(devices: Mapping[str, str]) -> list[str]:
 def _lost(
     message: str, context: RunContext, name: TrialName, error: TrialFileError
 ) -> TrialLostError:
-    """Let the arm hold and return the message of a trial that the disk did not take."""
+    """Hold the arm; returns the error for a trial that could not be written."""
     context.loop_client.request(ArmState.HOLD)
     seconds = context.state.fault_context.seconds
     details = {

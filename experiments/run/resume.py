@@ -1,4 +1,4 @@
-"""Sessions on the disk that are opened again: resumed, redone, or closed."""
+"""Resume, redo or close a session on the disk."""
 
 import argparse
 from collections.abc import Mapping, Sequence
@@ -32,7 +32,7 @@ from experiments.settings.load import load_settings
 
 
 class ResumeChoice(Enum):
-    """What becomes of an unfinished session."""
+    """Choice for an unfinished session."""
 
     RESUME = "resume"
     CLOSE = "close"
@@ -51,17 +51,17 @@ def choose_resume(
     operator: OperatorInput,
     console: Console,
 ) -> ResumeChoice:
-    """Ask what becomes of the newest unfinished session.
+    """Ask whether to resume or close the newest unfinished session.
 
     Args:
         sessions: the unfinished sessions, oldest first, at least one.
-        terrain: the requested one.
+        terrain: the requested terrain.
         data: option of a command that names the data folder, "" for none.
-        operator: who answers.
-        console: where it is asked.
+        operator: answers the question.
+        console: output.
 
     Raises:
-        SessionError: there is no terminal to ask on, or the answer was [q]uit.
+        SessionError: there is no terminal, or the answer was [q]uit.
     """
     newest = sessions[-1]
     text = _question(newest, terrain)
@@ -82,7 +82,7 @@ def choose_resume(
 
 
 def _question(newest: UnfinishedSession, terrain: str) -> str:
-    """Return which session is unfinished, with the terrains where they differ."""
+    """Message on the unfinished session, with the terrains if they differ."""
     if newest.folder.terrain == terrain:
         return newest.text()
     details = {**newest.metadata(), "asked": terrain}
@@ -96,20 +96,20 @@ _OPENINGS = (Event.STARTED, Event.RESUMED, Event.REDO)
 
 @dataclass(frozen=True, slots=True)
 class ResumeRequest:
-    """How a session is opened again, as on the command line.
+    """Request to open a session again, from the command line.
 
     Attributes:
         data: the data folder.
-        config: a rig.toml; None = the one of the session.
-        console: where everything is printed.
-        mode: how simulated time passes; None = as before.
-        is_fake: a simulated session is meant.
+        config: a rig.toml; None = that of the session.
+        console: output.
+        mode: mode of simulated time; None = as before.
+        is_fake: whether a simulated session is expected.
         is_forced: record under other conditions, too.
         allow_missing: go on without kept trials that are missing or changed.
-        operator: name; empty = the one of the session.
-        script: of an operator; None = the keyboard.
-        can_log: file that the bus is logged to.
-        faults: to be injected into the simulation.
+        operator: name; empty = that of the session.
+        script: script of an operator; None = the keyboard.
+        can_log: log file of the bus.
+        faults: faults to inject into the simulation.
     """
 
     data: Path
@@ -126,7 +126,7 @@ class ResumeRequest:
 
 
 def resume_request(args: argparse.Namespace) -> ResumeRequest:
-    """Return the request that the options of `resume_session` and `redo` make."""
+    """Build the request from the options of `resume` and `redo`."""
     return ResumeRequest(
         data=args.data,
         config=args.config,
@@ -143,10 +143,11 @@ def resume_request(args: argparse.Namespace) -> ResumeRequest:
 
 
 def resume_session(folder: SessionFolder, request: ResumeRequest) -> int:
-    """Continue a session that is not finished; return the exit code.
+    """Resume an unfinished session; returns the exit code.
 
     Raises:
-        SessionError: it is open elsewhere, not to be resumed, or of the other kind.
+        SessionError: the session is open elsewhere, cannot be resumed, or is of the
+            other kind.
     """
     _check_kind(folder, request)
     with session_lock(folder):
@@ -162,10 +163,11 @@ def resume_session(folder: SessionFolder, request: ResumeRequest) -> int:
 def redo(
     folder: SessionFolder, number: int, reason: str, request: ResumeRequest
 ) -> int:
-    """Record trial `number` once more; return the exit code.
+    """Repeat trial `number`; returns the exit code.
 
     Raises:
-        SessionError: it is open elsewhere, has no such trial, or is of the other kind.
+        SessionError: the session is open elsewhere, has no such trial, or is of the
+            other kind.
     """
     _check_kind(folder, request)
     with session_lock(folder):
@@ -177,10 +179,10 @@ def redo(
 
 
 def close(folder: SessionFolder, reason: str, console: Console) -> None:
-    """Give an unfinished session up; what was kept stays.
+    """Close an unfinished session; its kept trials stay.
 
     Raises:
-        SessionError: it is open elsewhere.
+        SessionError: the session is open elsewhere.
     """
     with session_lock(folder):
         journal = _recovered(folder, console)
@@ -201,9 +203,10 @@ def _recovered(folder: SessionFolder, console: Console) -> Journal:
 
 
 def _check_kept(folder: SessionFolder, request: ResumeRequest) -> None:
-    """Refuse to go on beside kept trials that are gone, unless that is allowed.
+    """Refuse to go on with kept trials missing, unless that is allowed.
 
-    What is derived anew is a witness of what the journal has lost, until it is.
+    Checked before the files are derived again, since they are the only evidence of
+    events that the journal has lost.
 
     Raises:
         KeptDataError: kept trials are missing or changed.
@@ -260,13 +263,13 @@ def _reopen(
 
 
 def _last_opening(journal: Journal) -> dict[str, Any]:
-    """Return the event with which the session was opened last."""
+    """Event of the last opening of the session."""
     events = [e for e in journal.folder.events() if e.get("event") in _OPENINGS]
     return events[-1] if events else {}
 
 
 def _person_of(opening: Mapping[str, Any], operator: OperatorInput) -> str:
-    """Return the name of a session's person for a person; "" for who answers now."""
+    """Return the session's operator; "" if that or the present one is no person."""
     name = str(opening.get("operator") or "")
     return "" if NO_PERSONS & {name, operator.who} else name
 
@@ -277,7 +280,7 @@ def _path_of(opening: Mapping[str, Any], name: str) -> Path | None:
 
 
 def fake_of(opening: Mapping[str, Any], request: ResumeRequest) -> FakeOptions:
-    """Return how it was simulated before, and how time is to pass now."""
+    """Return the options of the last simulation, with the requested time mode."""
     try:
         before = _FAKE.validate_python(opening.get("fake"))
     except ValidationError:

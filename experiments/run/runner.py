@@ -20,7 +20,7 @@ from experiments.session.journal import Journal
 from experiments.session.sidecar import TrialName
 from experiments.session.states import Event
 
-FAULTS_IN_A_ROW = 5  # end the session: recording again does not help
+FAULTS_IN_A_ROW = 5  # end the session
 
 
 class SessionRunner:
@@ -36,14 +36,14 @@ class SessionRunner:
         self._faults = 0
 
     def run(self, opening: Event, **details: object) -> int:
-        """Record until nothing is left to record; return the exit code.
+        """Record all outstanding trials; returns the exit code.
 
-        Every way out - complete, stop, fault, bug - leaves the arm idle and what was
-        recorded on the disk.
+        Every exit - complete, stop, fault, bug - leaves the arm idle and the recordings
+        on the disk.
 
         Args:
-            opening: how the session is opened: started, resumed, or for a redo.
-            details: what the journal records of it.
+            opening: kind of opening: started, resumed, or for a redo.
+            details: fields of its event in the journal.
         """
         context = self._context
         context.journal.append(opening, **details)
@@ -92,14 +92,14 @@ class SessionRunner:
             is_over = context.journal.state.is_over
 
     def _close_session(self) -> None:
-        """Tare once more, and let the last verdict be taken back."""
+        """Take the final tare, and allow an undo of the last verdict."""
         take_end_tare(self._context)
         await_undo(self._context)
 
     def _try(self, step: Callable[[], None]) -> None:
-        """Do one step; a fault that leaves the arm holding does not end the session.
+        """Run one step; a fault that leaves the arm holding does not end the session.
 
-        Nor does a verdict that is taken back in it: the trial is judged again.
+        Neither does an undo of the verdict: the trial is judged again.
         """
         context = self._context
         context.state.fault_context = FaultContext()
@@ -129,13 +129,13 @@ class SessionRunner:
         ask_verdict(context, name, outcome)
 
     def _make_safe(self) -> str:
-        """Idle the arm and return its state in words; safe to repeat."""
+        """Idle the arm; returns its state as text; safe to repeat."""
         context = self._context
         is_confirmed = context.console_loop.make_safe()
         return rest_text(context.rig.backend.safety_mode(), is_confirmed=is_confirmed)
 
     def _report_bug(self, arm_text: str, trace: str) -> None:
-        """Print where the arm is and what is safe; the traceback goes to the log."""
+        """Print the state of the arm and what is safe; logs the traceback."""
         context = self._context
         log = context.metadata.folder.path / "log.txt"
         details = {"error": trace.splitlines()[-1], "rest": arm_text, "log": log}

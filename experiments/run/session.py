@@ -1,4 +1,4 @@
-"""One opening of a session from connecting the rig to the arm at rest."""
+"""One opening of a session, from connecting the rig to the arm at rest."""
 
 from collections.abc import Mapping
 from contextlib import ExitStack
@@ -45,19 +45,19 @@ from experiments.settings.matrix import TerrainRow
 
 @dataclass(frozen=True, slots=True)
 class SessionRequest:
-    """A session as requested: where, with which rig, and by whom.
+    """Request for a session: data folder, rig, operator.
 
     Attributes:
         data: the data folder.
         settings: rig.toml and matrix.toml.
-        config: the rig.toml that was named; None = as shipped.
+        config: path of the rig.toml; None = as shipped.
         row: row of the matrix.
-        fake: how the rig is simulated; None = it is real.
-        operator_name: empty = not given.
+        fake: options of the simulation; None = real rig.
+        operator_name: name; empty = not given.
         operator: answers the prompts.
-        console: where everything is printed.
-        faults: to be injected into the simulation, as on the command line.
-        can_log: file that the bus is logged to.
+        console: output.
+        faults: faults to inject into the simulation, as on the command line.
+        can_log: log file of the bus.
     """
 
     data: Path
@@ -73,18 +73,18 @@ class SessionRequest:
 
     @property
     def who(self) -> str:
-        """Name of the operator: as given, else of whoever presses the keys."""
+        """Name of the operator: as given, else that of the keyboard's user."""
         return self.operator_name or self.operator.who
 
 
 @dataclass(frozen=True, slots=True)
 class OpenMode:
-    """How a session is opened.
+    """Kind of opening of a session.
 
     Attributes:
         event: started, resumed, or for a redo.
-        details: what the journal records of it.
-        journal: of the session on the disk, its lock held; None = a new session.
+        details: fields of the event in the journal.
+        journal: journal of an existing session, its lock held; None = new session.
         is_forced: record under other conditions, too.
     """
 
@@ -95,11 +95,11 @@ class OpenMode:
 
 
 def run_session(request: SessionRequest, mode: OpenMode) -> int:
-    """Connect, check, record; return the exit code.
+    """Connect, check, record; returns the exit code.
 
     Raises:
-        PreflightError: the rig is not fit.
-        SessionError: the conditions are not those of the session.
+        PreflightError: the rig fails the preflight.
+        SessionError: the conditions differ from those of the session.
     """
     console, stop = request.console, StopFlag()
     rig = connect_rig(request.settings, request.row, request.fake)
@@ -129,7 +129,7 @@ def run_session(request: SessionRequest, mode: OpenMode) -> int:
             metadata = _write_metadata(request, page, journal)
             console_loop = ConsoleLoop(rig, console, operator, stop, hand, faults)
             runner = SessionRunner(console_loop, metadata, journal)
-            code = runner.run(mode.event, **_details(request, mode, differences))
+            code = runner.run(mode.event, **_opening_fields(request, mode, differences))
     for plan in faults.plans if faults is not None else ():
         text = plan.to_text()
         console.say(f"▲ The fault {text} was not raised: its time was not reached.")
@@ -138,10 +138,10 @@ def run_session(request: SessionRequest, mode: OpenMode) -> int:
 
 
 def _check_rig(request: SessionRequest, rig: Rig, host_faults: HostFaults) -> Preflight:
-    """Return the page of the preflight, the foot confirmed first.
+    """Confirm the foot, then run the preflight; returns its page.
 
     Raises:
-        PreflightError: the rig is not fit.
+        PreflightError: the rig fails the preflight.
         SessionError: the foot was not confirmed.
     """
     console = request.console
@@ -156,7 +156,7 @@ def _check_rig(request: SessionRequest, rig: Rig, host_faults: HostFaults) -> Pr
 def _check_conditions(
     now: Mapping[str, str], mode: OpenMode, console: Console
 ) -> list[str]:
-    """Return what differs from the conditions of a session that is opened again."""
+    """Differences to the conditions of a session that is opened again."""
     if mode.journal is None:
         return []
     folder, is_forced = mode.journal.folder, mode.is_forced
@@ -170,7 +170,7 @@ def _open_journal(
     stack: ExitStack,
     host_faults: HostFaults,
 ) -> Journal:
-    """Return the journal on the rig's clock; a new session gets its folder and lock."""
+    """Return the journal on the rig's clock; creates and locks a new session."""
     if mode.journal is not None:
         host_faults.enter_session(mode.journal.folder)
         return replace(mode.journal, clock=rig.clock)
@@ -194,7 +194,7 @@ def _open_journal(
 def _write_metadata(
     request: SessionRequest, page: Preflight, journal: Journal
 ) -> SessionMetadata:
-    """Write what is known at this opening; later ones get a number of their own."""
+    """Write the metadata of this opening; files of later ones are numbered."""
     seed = request.fake.seed if request.fake is not None else None
     metadata = collect_metadata(journal.folder, request.who, seed, page.devices)
     number = journal.state.openings + 1
@@ -206,10 +206,10 @@ def _write_metadata(
     return metadata
 
 
-def _details(
+def _opening_fields(
     request: SessionRequest, mode: OpenMode, differences: list[str]
 ) -> dict[str, object]:
-    """Return what the journal records of this opening, for the next one."""
+    """Fields of the journal's event of this opening, read by the next one."""
     details = {
         **mode.details,
         "operator": request.who,
@@ -220,7 +220,7 @@ def _details(
 
 
 def _print_next(request: SessionRequest, journal: Journal, code: int) -> None:
-    """Print what comes next: the report, and the terrain that time asks for."""
+    """Print the next steps: the report, and the next terrain."""
     name, data = journal.folder.id, data_option(request.data)
     if not journal.state.is_complete:
         request.console.say(f"To go on: traction resume {name}{data}")
@@ -235,7 +235,7 @@ def _print_next(request: SessionRequest, journal: Journal, code: int) -> None:
         steps = next_steps(
             request.data, seen, matrix, Where(), is_simulated=is_simulated
         )
-    except TractionError as error:  # of another session; this one is complete
+    except TractionError as error:  # in another session; this one is complete
         steps = [f"▲ The next terrain is unknown: {error.message}"]
     for step in steps:
         request.console.say(step)

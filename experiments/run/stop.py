@@ -1,4 +1,4 @@
-"""How a session ends early: a stop that was requested, or a fault of the arm."""
+"""Early ends of a session: a requested stop, or a fault of the arm."""
 
 import signal
 from collections.abc import Generator
@@ -9,7 +9,7 @@ from acquisition.clock import NS_PER_S, Clock, SystemClock
 from acquisition.control_loop.faults import GuardVerdict
 
 URGENT_NS = 3 * NS_PER_S  # two requests closer than this: stop now
-INTERRUPTED = 130  # exit code of a stop that was requested outside a session
+INTERRUPTED = 130  # exit code of a stop requested outside a session
 
 
 class StopRequestedError(Exception):
@@ -17,14 +17,14 @@ class StopRequestedError(Exception):
 
 
 class UndoRequestedError(Exception):
-    """The operator takes the newest verdict back, while that is possible."""
+    """The operator undoes the newest verdict in time."""
 
 
 class ArmFaultError(Exception):
     """The guard stopped the arm.
 
     Attributes:
-        verdict: of the guard.
+        verdict: verdict of the guard.
     """
 
     def __init__(self, verdict: GuardVerdict) -> None:
@@ -34,12 +34,12 @@ class ArmFaultError(Exception):
 
 @dataclass(slots=True)
 class StopFlag:
-    """How often a stop was requested; set by signal handlers, read every tick.
+    """Counter of stop requests; set by signal handlers, read every tick.
 
     Attributes:
-        clock: the operator's time, never the simulated one.
+        clock: real time, even in a simulation.
         count: number of requests.
-        is_urgent: two requests within 3 s: the arm stops before anything is finished.
+        is_urgent: two requests within 3 s: the arm stops before anything else.
     """
 
     clock: Clock = field(default_factory=SystemClock)
@@ -59,7 +59,7 @@ class StopFlag:
 def handle_signals(stop: StopFlag, *, is_service: bool = False) -> Generator[None]:
     """Turn Ctrl-C, SIGTERM and a lost terminal into requests to stop.
 
-    A service outlives its terminal where it was started to do so, as by nohup.
+    A service started with SIGHUP ignored, as by nohup, outlives its terminal.
     """
     numbers = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
     if is_service and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:

@@ -1,4 +1,4 @@
-"""What an arm that moves by itself keeps clear of."""
+"""Obstacles of an arm that moves automatically: floor and container."""
 
 import numpy as np
 
@@ -10,23 +10,23 @@ from wam.calibration.free_space import FreeSpace
 from wam.model.clearance import BASE_HEIGHT, ArmClearance, ObstacleBox
 from wam.model.constants import load_constants
 
-ABOVE = 0.10  # m that sole, plate and elbow stay above the highest container
-RIM = 0.03  # of a container above its plane [m]
+ABOVE = 0.10  # m, clearance of sole, plate and elbow above the highest container
+RIM = 0.03  # height of a container's rim above its plane [m]
 _BESIDE, _BEYOND = 0.25, 0.10  # half a container's width, and past a trial's ends [m]
 
 
 def container_box(frame: TerrainFrame) -> ObstacleBox:
-    """Return the container as a box that stands on the floor."""
+    """Return the container as a box on the floor."""
     axes = frame.axes()
-    deep = _highest(frame) + BASE_HEIGHT
-    size = np.array([frame.travel + 2.0 * _BEYOND, 2.0 * _BESIDE, deep + RIM])
-    middle = np.array([0.5 * frame.travel, 0.0, 0.5 * (RIM - deep)])
+    depth = _highest(frame) + BASE_HEIGHT
+    size = np.array([frame.travel + 2.0 * _BEYOND, 2.0 * _BESIDE, depth + RIM])
+    middle = np.array([0.5 * frame.travel, 0.0, 0.5 * (RIM - depth)])
     center = np.array(frame.far_end) + middle @ axes
     return ObstacleBox("the container", center, size, axes.T)
 
 
 def free_space(settings: Settings, row: TerrainRow) -> FreeSpace:
-    """Return where the arm may move with the foot and beside the container of `row`."""
+    """Return the free space of the arm with the foot and container of `row`."""
     frames = map(terrain_frame, settings.matrix.terrains)
     floor = max(map(_highest, frames)) + ABOVE
     tool = build_tool(settings.rig, row.foot)
@@ -35,5 +35,5 @@ def free_space(settings: Settings, row: TerrainRow) -> FreeSpace:
 
 
 def _highest(frame: TerrainFrame) -> float:
-    """Return how high the higher end of a container is [m]."""
+    """Height of the higher end of a container [m]."""
     return max(frame.far_end[2], frame.from_other_end().far_end[2])

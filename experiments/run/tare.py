@@ -1,7 +1,7 @@
-"""The tare: the foot is lifted and still, and the sensor shows what it should.
+"""The tare: bias of the sensor with the foot lifted and still.
 
-Before the first one the arm turns the foot and proves that a calibrated sensor is
-mounted as it was: the weight of the foot must turn in it as the joints say.
+Before the first tare the arm turns the foot to verify the mounting of a calibrated
+sensor: the measured weight must rotate as the joints do.
 """
 
 from collections.abc import Mapping, Sequence
@@ -36,12 +36,12 @@ from wam.model.constants import Array
 TARE_SECONDS = 1.0
 STILL_SECONDS = 0.3
 STILL_SPEED = 0.01  # m/s
-LIFTED = 0.03  # the foot counts as lifted this far above the plane [m]
-MOST_TARES = 5  # refused in a row: something is wrong that patience cannot mend
+LIFTED = 0.03  # height above the plane from which the foot counts as lifted [m]
+MOST_TARES = 5  # attempts
 
 
 def take_tare(context: RunContext, name: TrialName) -> None:
-    """Wait until the foot is lifted and still, tare, and try again if it moved.
+    """Wait until the foot is lifted and still, then tare; retries if it moved.
 
     Raises:
         PreflightError: five tares in a row were refused.
@@ -62,9 +62,9 @@ def take_tare(context: RunContext, name: TrialName) -> None:
 
 
 def take_end_tare(context: RunContext) -> None:
-    """Tare once more, so that two tares bracket the drift of the session.
+    """Take the final tare, so that two tares bracket the drift of the session.
 
-    Everything is kept already: whatever goes wrong costs the bracket only.
+    All trials are kept already: a failure costs only the bracket.
     """
     try:
         take_tare(context, TrialName(0, 1))
@@ -80,11 +80,11 @@ def take_end_tare(context: RunContext) -> None:
 
 
 def prove_mounting(services: RunServices) -> None:
-    """Turn the activated arm's wrist once, if the sensor is a calibrated one.
+    """Verify the mounting of a calibrated sensor by turning the wrist once.
 
     Raises:
-        PreflightError: the weight does not turn in the sensor as it should, a joint is
-            not where it was sent, or the arm was touched.
+        PreflightError: the measured weight does not rotate with the wrist, a joint is
+            off its target, or the arm was touched.
         SettingsError: the arm cannot rise or turn its wrist.
         ArmFaultError, StopRequestedError: as `ConsoleLoop.tick`.
     """
@@ -112,7 +112,7 @@ def prove_mounting(services: RunServices) -> None:
     limit = rig.settings.rig.limits.residual
     if change.error > limit or change.is_turned:
         fields = {"error": change.error, "limit": limit}
-        raise preflight_error("mounting", **fields, **_likely(rig, change))
+        raise preflight_error("mounting", **fields, **_cause_fields(rig, change))
     services.say(
         f"{GOOD} mounting verified: {change.error:.1f} N off (limit {limit:.1f})"
     )
@@ -120,10 +120,10 @@ def prove_mounting(services: RunServices) -> None:
 
 
 def residual_force(payload: Payload, known: Array) -> float:
-    """Return how far a tared `payload` is from the `known` bias of the sensor [N].
+    """Difference of the tared bias to the `known` bias of the sensor [N].
 
-    A tare hides a wrong mass of the foot in this pose and leaves it in all others;
-    only a sensor whose own bias is known can tell.
+    A tare hides a wrong mass of the foot in this pose only; the known bias of a
+    calibrated sensor reveals it.
     """
     return float(np.linalg.norm(payload.bias[:3] - known[:3]))
 
@@ -131,10 +131,9 @@ def residual_force(payload: Payload, known: Array) -> float:
 def known_bias(
     calibrations: Mapping[str, str], foot: str, *, is_simulated: bool
 ) -> Array | None:
-    """Return what the sensor shows without any load [N, N m], shape (6,).
+    """Sensor reading without load [N, N m], shape (6,), or None if unknown.
 
-    It is in a calibration with this foot; a simulated sensor without calibration
-    has none by construction. None where it is unknown.
+    From the calibration with this foot; zero for an uncalibrated simulated sensor.
     """
     stored = _calibration_of(calibrations, foot)
     if stored is not None:
@@ -145,7 +144,7 @@ def known_bias(
 def _calibration_of(
     calibrations: Mapping[str, str], foot: str
 ) -> SensorCalibration | None:
-    """Return the sensor's calibration with this foot, None where there is none."""
+    """Return the sensor's calibration with this foot, or None."""
     for name, text in calibrations.items():
         if not name.startswith(PREFIX) or "readings" not in text:
             continue  # of a container
@@ -156,7 +155,7 @@ def _calibration_of(
 
 
 def _measure(services: RunServices, name: TrialName) -> TareResult:
-    """Return the tare of one second, in which the arm stands by itself.
+    """Return the tare of one second with the arm holding.
 
     Raises:
         PreflightError: the force varied, or samples were lost or flagged.
@@ -176,8 +175,8 @@ def _mean(services: RunServices, samples: Sequence[WrenchSample]) -> TareResult:
     """Return the mean of one second.
 
     Raises:
-        PreflightError: the force varied, samples were lost or flagged, or the sensor is
-            not read at all.
+        PreflightError: the force varied, samples were lost or flagged, or the sensor
+            is not read at all.
     """
     rig = services.rig
     limit = rig.settings.rig.limits.tare_spread
@@ -194,10 +193,10 @@ def _mean(services: RunServices, samples: Sequence[WrenchSample]) -> TareResult:
 
 
 def _accept(context: RunContext, name: TrialName, result: TareResult) -> None:
-    """Use the tare from here on.
+    """Check the tare and use it from here on.
 
     Raises:
-        PreflightError: it hides a force that the sensor does not have by itself.
+        PreflightError: its bias differs from that of the unloaded sensor.
     """
     rig = context.rig
     position = context.loop_client.latest()["position"][0]
@@ -221,8 +220,8 @@ def _accept(context: RunContext, name: TrialName, result: TareResult) -> None:
             context.say(f"{WARNING} {before.untared.kept}: {doubt.text}.")
 
 
-def _likely(rig: Rig, change: WeightChange) -> dict[str, str]:
-    """Return what explains a weight that is not as expected, for the messages."""
+def _cause_fields(rig: Rig, change: WeightChange) -> dict[str, str]:
+    """Fields of messages that explain an unexpected weight."""
     payload = rig.payload
     return weight_words(
         change.cause,
@@ -242,7 +241,7 @@ def _check_residual(rig: Rig, tared: Payload, rotation: Array) -> None:
     if known is not None and residual > limit:
         fields = {"residual": residual, "limit": limit}
         change = measured_weight(tared, rotation, known)
-        raise preflight_error("residual", **fields, **_likely(rig, change))
+        raise preflight_error("residual", **fields, **_cause_fields(rig, change))
 
 
 def _wait_still(services: RunServices, name: TrialName) -> None:

@@ -1,4 +1,4 @@
-"""One trial on its way to the disk: header, end conditions, flight record."""
+"""Files and end conditions of one trial: header, truth, flight record."""
 
 import json
 from collections import deque
@@ -21,14 +21,14 @@ from experiments.session.store import SessionFolder, iso_utc
 from ft_sensor.calibration.files import payload_to_toml, terrain_to_toml
 from wam.model.arm_model import urdf
 
-AFTER_TRAVEL = 0.4  # a trial goes on this long after the foot has crossed [s]
+AFTER_TRAVEL = 0.4  # recording continues this long after the foot has crossed [s]
 FLIGHT_SECONDS = 2.0
 PACE_SECONDS, PACE_LIMIT = 1.0, 0.2  # s, m/s
 
 
 @dataclass(frozen=True, slots=True)
 class SessionMetadata:
-    """What every trial of a session repeats in its metadata."""
+    """Metadata common to all trials of a session."""
 
     folder: SessionFolder
     operator: str
@@ -40,14 +40,14 @@ class SessionMetadata:
 def collect_metadata(
     folder: SessionFolder, operator: str, seed: int | None, devices: Mapping[str, str]
 ) -> SessionMetadata:
-    """Return the facts of a session; asks git once."""
+    """Collect the metadata of a session; calls git once."""
     details = provenance.collect()
     details.update(devices)
     return SessionMetadata(folder, operator, seed, details, provenance.diff_patch())
 
 
 def trial_header(rig: Rig, details: SessionMetadata, name: TrialName) -> TrialHeader:
-    """Return everything that is known about a trial before its first cycle."""
+    """Return the header of a trial, complete before its first cycle."""
     row = rig.row
     offset, uncertainty = utc_offset_ns(rig.clock)
     assert rig.model.tool is not None
@@ -69,7 +69,7 @@ def trial_header(rig: Rig, details: SessionMetadata, name: TrialName) -> TrialHe
         "seed": "" if details.seed is None else str(details.seed),
         "started_utc": iso_utc(rig.clock.utc_ns()),
         "tared_ns": str(rig.tared_ns),
-        **_stated_factors(rig),
+        **_factor_metadata(rig),
     }
     terrain = {"stones": row.stones, "foot": row.foot}
     attachments = {
@@ -93,12 +93,12 @@ def trial_header(rig: Rig, details: SessionMetadata, name: TrialName) -> TrialHe
     )
 
 
-def _stated_factors(rig: Rig) -> dict[str, str]:
-    """Return what the matrix states of a cell; {} where that is nothing.
+def _factor_metadata(rig: Rig) -> dict[str, str]:
+    """Metadata of a cell of the matrix with factors; {} for a cell of the paper.
 
-    That is so without factors, of a push toward the base with foot "tread" or "bare".
-    `factors` is JSON: values by name, null = does not apply; `factor_units` and
-    `factor_scales` their units, and on which scale numbers are compared.
+    {} = no factors, a push toward the base, and foot "tread" or "bare". `factors` is
+    JSON: values by name, null = does not apply; `factor_units` their units,
+    `factor_scales` the scales on which numbers are compared.
     """
     row, matrix = rig.row, rig.settings.matrix
     if not matrix.factors and row.push_deg == 0 and row.foot in ("tread", "bare"):
@@ -119,18 +119,18 @@ def _stated_factors(rig: Rig) -> dict[str, str]:
 
 @dataclass(slots=True)
 class EndDetector:
-    """Decides when a running trial is over, from time and travel.
+    """Detects the end of a running trial from time and travel.
 
     Attributes:
         travel: length of the container [m].
-        crossed_at: when the foot had crossed it [s since start], None before.
+        crossed_at: time at which the foot had crossed it [s since start], None before.
     """
 
     travel: float
     crossed_at: float | None = None
 
     def reason(self, elapsed: float, displacement: float) -> str:
-        """Return why the trial ends now, "" while it goes on."""
+        """Return the reason to end the trial now, "" while it goes on."""
         if self.crossed_at is None and displacement >= self.travel:
             self.crossed_at = elapsed
         if self.crossed_at is not None and elapsed >= self.crossed_at + AFTER_TRAVEL:
@@ -140,10 +140,10 @@ class EndDetector:
 
 @dataclass(slots=True)
 class PaceMonitor:
-    """Notices a foot that is pushed too fast, not one that slips.
+    """Detects a foot that is pushed too fast, as distinct from a slip.
 
-    A slip is over after centimetres; a second at 0.2 m/s is a push that leaves no time
-    to stick, which is all that the friction models live on.
+    A slip is over after centimetres; a second at 0.2 m/s is a push without the sticking
+    phases that the friction models need.
     """
 
     _path: deque[tuple[float, float]] = field(
@@ -151,11 +151,11 @@ class PaceMonitor:
     )
 
     def is_too_fast(self, elapsed: float, displacement: float) -> bool:
-        """Return whether the last second was too fast; then not again for a second.
+        """Return whether the last second was too fast; at most once a second.
 
         Args:
-            elapsed: since the start of the trial [s], growing.
-            displacement: of the foot along the container [m].
+            elapsed: time since the start of the trial [s], increasing.
+            displacement: displacement of the foot along the container [m].
         """
         path = self._path
         path.append((elapsed, displacement))
@@ -168,7 +168,7 @@ class PaceMonitor:
 
 
 def write_truth(rig: Rig, header: TrialHeader, path: Path) -> VerifiedFile | None:
-    """Write what the simulation knows beside a trial; None on the real rig."""
+    """Write the truth of a simulated trial alongside it; None on the real rig."""
     if rig.simulation is None:
         return None
     records = rig.simulation.take_truth()
@@ -205,7 +205,7 @@ class TrialArchive:
     metadata: SessionMetadata
 
     def seal(self, header: TrialHeader, name: TrialName, reason: str) -> VerifiedFile:
-        """End and verify the trial file, and the truth beside it when simulated.
+        """Complete and verify the trial file, and the truth file if simulated.
 
         Raises:
             TrialFileError: a file could not be written or verified.
@@ -216,7 +216,7 @@ class TrialArchive:
         return verified
 
     def flight(self, header: TrialHeader, name: TrialName, reason: str) -> str:
-        """Write the flight record of a fault; return what to say about it."""
+        """Write the flight record of a fault; returns the line to print."""
         path = self.metadata.folder.faults / f"{name.rejected}.flight.mcap"
         try:
             write_flight(self.rig, header, path, reason)

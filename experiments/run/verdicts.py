@@ -1,4 +1,4 @@
-"""What the operator says of a trial: remarks, its verdict, and another one later."""
+"""Verdicts and notes of the operator: at the review, and on undo."""
 
 from acquisition.control_loop.states import ArmState
 from acquisition.errors import SessionError, TractionError
@@ -23,7 +23,7 @@ _NO_VERDICT = (
 
 
 def ask_verdict(context: RunContext, name: TrialName, outcome: TrialOutcome) -> None:
-    """Ask until a trial is kept or rejected; the verdict is the operator's alone.
+    """Ask until the operator keeps or rejects the trial.
 
     Raises:
         ArmFaultError: the arm is not under control; the trial is rejected.
@@ -33,7 +33,7 @@ def ask_verdict(context: RunContext, name: TrialName, outcome: TrialOutcome) -> 
     context.state.fault_context = FaultContext(name.kept, prompt=Prompt.REVIEW)
     least = MINIMUM_TRAVEL_SHARE * context.rig.frame.travel
     is_whole = outcome.displacement >= least
-    is_asked = not is_whole  # one that is not whole is rejected by [q] at once
+    is_asked = not is_whole  # [q] rejects an incomplete trial at once
     feet = context.watch_foot()
     while True:
         try:
@@ -45,7 +45,7 @@ def ask_verdict(context: RunContext, name: TrialName, outcome: TrialOutcome) -> 
             try:
                 context.clear_faults(fault)
             except ArmFaultError:
-                # The trial is whole, but no verdict can be given any more.
+                # The trial is complete, but no verdict can be given any more.
                 context.reject(name, _ENDED)
                 raise
             continue
@@ -60,7 +60,7 @@ def _apply_key(context: RunContext, name: TrialName, key: str) -> bool:
     """Return whether `key` was a verdict.
 
     Raises:
-        StopRequestedError: it, or Ctrl-C, ends the session.
+        StopRequestedError: `key` or Ctrl-C ends the session.
     """
     action = key_action(Prompt.REVIEW, key)
     if action is KeyAction.KEEP:
@@ -74,18 +74,18 @@ def _apply_key(context: RunContext, name: TrialName, key: str) -> bool:
         return True
     if action is KeyAction.QUIT or context.stop.count:
         context.reject(name, _ENDED)
-        context.say(_later(context, name))
+        context.say(_unjudged_text(context, name))
         raise StopRequestedError
     return False
 
 
 def await_undo(context: RunContext) -> None:
-    """Let a person take the last verdict back before the session ends.
+    """Let a person undo the last verdict before the session ends.
 
-    Everything is kept already: a fault is told, and the session ends as it would.
+    All trials are kept already: a fault is printed, and the session ends as usual.
 
     Raises:
-        UndoRequestedError: the verdict is taken back.
+        UndoRequestedError: the verdict is undone.
     """
     if context.state.given is None or context.operator.who in NO_PERSONS:
         return
@@ -104,7 +104,7 @@ def await_undo(context: RunContext) -> None:
 
 
 def judge_again(context: RunContext) -> None:
-    """Ask once more for the newest verdict; until another is given it stands.
+    """Ask again for the newest verdict, which stands until another is given.
 
     Raises:
         ArmFaultError: the arm is not under control.
@@ -137,12 +137,12 @@ def judge_again(context: RunContext) -> None:
 
 
 def take_note(services: RunServices, name: TrialName, *, is_on_trial: bool) -> None:
-    """Let a remark be typed and write it into the journal.
+    """Read a typed note and write it into the journal.
 
     Args:
-        services: what the session shares.
-        name: the trial it is about.
-        is_on_trial: it goes into the trial's sidecar too.
+        services: services of the session.
+        name: the current trial.
+        is_on_trial: whether the note also goes into the trial's sidecar.
 
     Raises:
         ArmFaultError: as `ConsoleLoop.line`.
@@ -176,8 +176,8 @@ def _write_note(services: RunServices, name: TrialName | None, text: str) -> Non
     services.say(f"Noted on {stem}: {text}")
 
 
-def _later(services: RunServices, name: TrialName) -> str:
-    """Return where a trial without a verdict went, and how it is kept after all."""
+def _unjudged_text(services: RunServices, name: TrialName) -> str:
+    """Message on a trial without a verdict: its location and how to keep it."""
     session = services.metadata.folder
     command = f"traction verdict {session.id} {name.rejected} keep REASON"
     command += data_option(session.path.parent.parent)

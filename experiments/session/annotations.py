@@ -1,4 +1,4 @@
-"""What people say about sessions on the disk: notes, and verdicts changed later."""
+"""Annotations of sessions on the disk: notes, and verdicts changed later."""
 
 import re
 from pathlib import Path
@@ -31,7 +31,7 @@ def parse_trial(text: str) -> tuple[int, int]:
     """Return (number, attempt) of a name such as T04b; attempt 0 for T04.
 
     Raises:
-        SessionError: it is not a name of a trial.
+        SessionError: `text` is not a name of a trial.
     """
     match = _TRIAL.match(text)
     if match is None:
@@ -48,7 +48,7 @@ def clean_text(text: str) -> str:
     """Return `text` on one line, without control characters.
 
     Raises:
-        SessionError: nothing is left, or it is too long.
+        SessionError: the text is empty or too long.
     """
     words = " ".join(text.split())
     cleaned = "".join(sign for sign in words if sign.isprintable())
@@ -61,7 +61,7 @@ def clean_text(text: str) -> str:
 
 
 def author(name: str) -> str:
-    """Return `name`, or that of the person who is logged in."""
+    """Return `name`, or the login name if it is empty."""
     return clean_text(name) if name else login_name()
 
 
@@ -70,7 +70,7 @@ def add_note(folder: SessionFolder, trial: str, text: str, who: str) -> str:
 
     Raises:
         SessionError: the session is open elsewhere, was never started, or has no such
-            trial; or there is no text.
+            trial; or the text is empty.
     """
     text, who = clean_text(text), author(who)
     with session_lock(folder):
@@ -88,11 +88,11 @@ def add_note(folder: SessionFolder, trial: str, text: str, who: str) -> str:
 def change_verdict(
     folder: SessionFolder, trial: str, verdict: str, reason: str, who: str
 ) -> list[str]:
-    """Keep or reject a trial that was recorded before; return what to say.
+    """Keep or reject a trial recorded earlier; returns the lines to print.
 
     Raises:
         SessionError: the session is open elsewhere, has no such trial, another attempt
-            is kept, or its file is not what was recorded.
+            is kept, or its file was changed.
     """
     reason, who = clean_text(reason), author(who)
     with session_lock(folder):
@@ -125,7 +125,7 @@ def trial_path(folder: SessionFolder, trial: str) -> Path:
     """Return the file of a trial, kept or rejected, without opening the session.
 
     Raises:
-        SessionError: there is none.
+        SessionError: there is no such trial.
     """
     number, attempt = parse_trial(trial)
     name = TrialName(number, attempt)
@@ -135,10 +135,10 @@ def trial_path(folder: SessionFolder, trial: str) -> Path:
     if not is_there(path):
         files = list_folder(folder.trials, "T*.mcap")
         files += list_folder(folder.rejected, "T*.mcap")
-        known = sorted(p.stem for p in files if "." not in p.stem)
+        trials = sorted(p.stem for p in files if "." not in p.stem)
         raise SessionError(
             f"There is no {trial} in {folder.id}.",
-            hint=f"Trials: {' '.join(known) or 'none'}.",
+            hint=f"Trials: {' '.join(trials) or 'none'}.",
         )
     return path
 
@@ -150,10 +150,10 @@ def _journal(folder: SessionFolder) -> Journal:
 
 
 def _find_attempt(journal: Journal, trial: str) -> TrialName:
-    """Return the attempt that `trial` means: T04a itself, T04 the kept or only one.
+    """Resolve `trial` to an attempt: T04a itself, T04 the kept or only one.
 
     Raises:
-        SessionError: there is none, or more than one.
+        SessionError: `trial` matches no attempt, or several.
     """
     number, attempt = parse_trial(trial)
     last = journal.state.attempt(number)
@@ -167,18 +167,18 @@ def _find_attempt(journal: Journal, trial: str) -> TrialName:
     attempt = attempt or kept or 1
     if attempt > last:
         names = dict.fromkeys(a.name.kept for a in journal.state.attempts)
-        known = " ".join(names) or "none yet"
+        trials = " ".join(names) or "none yet"
         raise SessionError(
-            f"There is no {trial} in {journal.folder.id}.", hint=f"Trials: {known}."
+            f"There is no {trial} in {journal.folder.id}.", hint=f"Trials: {trials}."
         )
     return TrialName(number, attempt)
 
 
 def _check_file(journal: Journal, name: TrialName) -> list[str]:
-    """Return what to say of a trial that is to be kept.
+    """Return the warnings about a trial that is to be kept.
 
     Raises:
-        SessionError: there is no file of it, or another than was recorded.
+        SessionError: its file is missing or changed.
     """
     attempt = journal.state.attempt_at(name)
     sidecar = sidecar_of(journal.folder, attempt)

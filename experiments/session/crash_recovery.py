@@ -1,4 +1,4 @@
-"""After a crash: files follow the journal again, the trial that ran is put away."""
+"""Recovery after a crash: files follow the journal, the cut trial is rejected."""
 
 from pathlib import Path
 
@@ -22,18 +22,18 @@ REASON = "the session ended without closing"
 
 
 def recover_session(journal: Journal) -> str:
-    """Bring a session into order whose lock is held; return what was put away.
+    """Recover a session whose lock is held; returns what was moved to rejected/.
 
-    Nothing that was kept is touched. The trial that ran is recovered and rejected, so
-    that it is recorded again. A second call changes nothing.
+    Kept trials are not touched. The running trial is recovered and rejected, so that
+    it is recorded again. A second call changes nothing.
 
     Raises:
-        SessionError: a recorder still ends the trial file of the session.
+        SessionError: a recorder is still writing a trial file of the session.
         TrialFileError: the disk is full or gone.
     """
     folder = journal.folder
     _wait_for_recorder(folder)
-    _sweep(folder)
+    _remove_temporary_files(folder)
     if journal.state.phase in OPEN:
         journal.append(Event.CRASH_FOUND)
     else:
@@ -44,13 +44,13 @@ def recover_session(journal: Journal) -> str:
     name = TrialName(number, journal.state.attempt(number))
     details: dict[str, object] = {"trial": number, "attempt": name.attempt}
     if not journal.state.attempt_at(name).is_recorded:
-        details["recording"] = _gather(folder, name)
+        details["recording"] = _move_to_rejected(folder, name)
     journal.append(Event.TRIAL_REJECTED, **details, reason=REASON, who=WHO)
     return f"{name.kept} will be redone, its data are in rejected/{name.rejected}.*"
 
 
 def _wait_for_recorder(folder: SessionFolder) -> None:
-    """Wait until a recorder whose console was killed has ended its file."""
+    """Wait until the recorder of a killed console has completed its file."""
     clock = SystemClock()
     end_ns = clock.now_ns() + PATIENCE_NS
     while is_claimed(folder.trials):
@@ -62,16 +62,16 @@ def _wait_for_recorder(folder: SessionFolder) -> None:
         clock.sleep_until(clock.now_ns() + _PAUSE_NS)
 
 
-def _gather(folder: SessionFolder, name: TrialName) -> dict[str, object]:
-    """Put what there is of a trial into rejected/; return the recording's numbers."""
+def _move_to_rejected(folder: SessionFolder, name: TrialName) -> dict[str, object]:
+    """Move the files of a trial to rejected/; returns the recording's figures."""
     path = folder.trials / f"{name.kept}.mcap"
     partial = path.with_name(path.name + ".partial")
     if is_there(partial) and not is_there(path):
         _recover(partial, path)
     for source, kind in (
         (partial, ".partial"),
-        (_truth(partial), ".truth.partial"),
-        (_truth(path), ".truth.mcap"),
+        (_truth_path(partial), ".truth.partial"),
+        (_truth_path(path), ".truth.mcap"),
         (path, ".mcap"),
     ):
         if is_there(source):
@@ -80,7 +80,7 @@ def _gather(folder: SessionFolder, name: TrialName) -> dict[str, object]:
 
 
 def _recover(partial: Path, path: Path) -> None:
-    """Save what is sound of `partial` as `path`; nothing where nothing is."""
+    """Save the valid part of `partial` as `path`, if there is one."""
     try:
         recovered = recover_file(partial).path
     except TrialFileError:
@@ -89,12 +89,12 @@ def _recover(partial: Path, path: Path) -> None:
     path.chmod(0o444)
 
 
-def _truth(path: Path) -> Path:
+def _truth_path(path: Path) -> Path:
     return path.with_name(path.name.replace(".mcap", ".truth.mcap"))
 
 
-def _sweep(folder: SessionFolder) -> None:
-    """Take away what a kill in the middle of a replacement has left."""
+def _remove_temporary_files(folder: SessionFolder) -> None:
+    """Remove the remains of replacements that a kill interrupted."""
     for directory in (folder.path, folder.trials, folder.rejected):
         for path in list_folder(directory, "*.*.tmp"):
             if path.with_suffix("").suffix in REPLACED:

@@ -1,4 +1,4 @@
-"""Reading and replacing the small files of a session; every name reaches the disk."""
+"""Read and replace the small files of a session, synced down to the directory."""
 
 import hashlib
 import json
@@ -28,11 +28,11 @@ from acquisition.trial_file.data_files import (
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Return a JSON object, an empty one where the file is missing or damaged.
+    """Return a JSON object, an empty one if the file is missing or damaged.
 
     Raises:
-        TrialFileError: it is not a regular file of this session, too large, or cannot
-            be read now.
+        TrialFileError: `path` is no regular file of this session, too large, or
+            unreadable at present.
     """
     try:
         return parse_object(read_data(path)) or {}
@@ -42,7 +42,7 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def parse_object(text: bytes) -> dict[str, Any] | None:
-    """Return the JSON object in `text`, None where there is none or a NaN."""
+    """Return the JSON object in `text`; None if it is none or contains NaN."""
     try:
         value: object = json.loads(text, parse_constant=_finite, parse_float=_finite)
     except (ValueError, RecursionError):
@@ -79,7 +79,7 @@ def write_new(path: Path, content: bytes) -> None:
     """Write `content` into a new file at `path`; never replaces one.
 
     Raises:
-        TrialFileError: it exists, or the disk is full or gone.
+        TrialFileError: `path` exists, or the disk is full or gone.
     """
     with writing(path), open_folder(path.parent) as folder:
         create_file(folder, path.name, content)
@@ -90,10 +90,10 @@ def write_new(path: Path, content: bytes) -> None:
 def move_file(source: Path, target: Path) -> None:
     """Give `source` the name `target` in another folder; never replaces a file.
 
-    A move that a kill has cut short, so that the file has both names, is finished.
+    A move that a kill interrupted, so that the file has both names, is completed.
 
     Raises:
-        TrialFileError: `target` exists, the disk is full or gone, or one of them is no
+        TrialFileError: `target` exists, the disk is full or gone, or a path is no
             regular file of the session.
     """
     with (
@@ -116,7 +116,7 @@ def move_file(source: Path, target: Path) -> None:
 
 
 def remove_file(path: Path) -> None:
-    """Take the name `path` away, down to the disk; nothing where there is none.
+    """Remove `path`, if it exists, and sync its directory.
 
     Raises:
         TrialFileError: the disk is full or gone.
@@ -129,7 +129,7 @@ def remove_file(path: Path) -> None:
 
 @contextmanager
 def writing(path: Path) -> Generator[None, None, None]:
-    """Turn what a full disk or a name that is taken raises into a TrialFileError."""
+    """Convert errors of a full disk or an existing name into TrialFileError."""
     try:
         yield
     except FileExistsError as error:
@@ -148,7 +148,7 @@ def writing(path: Path) -> Generator[None, None, None]:
 
 @contextmanager
 def reading(path: Path) -> Generator[None, None, None]:
-    """Turn what a file raises that cannot be read into a TrialFileError."""
+    """Convert errors of reading a file into TrialFileError."""
     try:
         yield
     except OSError as error:
@@ -161,8 +161,8 @@ def sha256_of(path: Path) -> str:
     """Return the hex digest of a file.
 
     Raises:
-        TrialFileError: it is not a regular file of the session, too large, or cannot be
-            read.
+        TrialFileError: `path` is no regular file of the session, too large, or
+            unreadable.
     """
     with reading(path), os.fdopen(open_data(path), "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
@@ -188,12 +188,12 @@ _CHECKED = re.compile(rb'^(?P<body>\{.+), "crc": "(?P<crc>[0-9a-f]{8})"\}$')
 
 
 def journal_line(event: Mapping[str, object], number: int) -> bytes:
-    """Return `event` as a line that carries the CRC-32 of what it would be without.
+    """Encode `event` as a line with the CRC-32 of the line without it.
 
     Args:
-        event: what has happened.
-        number: of the line in its file, from 1, which it states: a line that is gone
-            is missed by those behind it. The first line states the version.
+        event: the event.
+        number: line number in the file, from 1, written into the line so that lost
+            lines are detected. The first line also states the version.
     """
     stated = {**event, _NUMBER: number}
     if number == 1:
@@ -204,7 +204,7 @@ def journal_line(event: Mapping[str, object], number: int) -> bytes:
 
 
 def parse_line(line: bytes) -> dict[str, Any] | None:
-    """Return the event of a line, None where it is torn or its checksum is wrong."""
+    """Return the event of a line; None if it is torn or its checksum is wrong."""
     event = _parse_numbered(line)
     if event is not None:
         event.pop(_NUMBER, None)
@@ -213,9 +213,9 @@ def parse_line(line: bytes) -> dict[str, Any] | None:
 
 
 def journal_problem(text: bytes) -> str:
-    """Return why a journal of another version is not read; "" if it is one of 1.0.
+    """Return why a journal of another version is refused; "" for version 1.0.
 
-    A first line that is torn or changed says nothing of the version.
+    A torn or changed first line gives no version.
     """
     first = text.partition(b"\n")[0]
     event = parse_object(first)
@@ -236,9 +236,9 @@ def _parse_numbered(line: bytes) -> dict[str, Any] | None:
 
 
 def line_faults(text: bytes) -> list[str]:
-    """Return what is wrong with the lines of a journal, in words.
+    """Describe the faults in the lines of a journal.
 
-    A torn line is what a kill leaves, and no fault.
+    A torn line is the trace of a kill and no fault.
     """
     faults: list[str] = []
     for number, line in enumerate(text.splitlines(), 1):

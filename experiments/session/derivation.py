@@ -1,8 +1,7 @@
-"""Files of a session that follow from its journal: places, sidecars, session.json.
+"""Files derived from the journal: locations of trials, sidecars, session.json.
 
-The journal decides; nothing here is read to learn what it says. Only the numbers of a
-recording that an older journal does not state are taken from the sidecar, or from the
-recording itself.
+The journal is the only source. Only the figures of a recording that an older journal
+does not state come from the sidecar, or from the recording itself.
 """
 
 from collections.abc import Sequence
@@ -23,36 +22,41 @@ from experiments.session.sidecar import Attempt, TrialOutcome, recording_of
 from experiments.session.states import SessionPhase
 from experiments.session.store import SUMMARY_FILE, SessionFolder
 
-_SUFFIXES = (".truth.mcap", ".mcap")  # what moves last shows whose the others are
+_SUFFIXES = (
+    ".truth.mcap",
+    ".mcap",
+)  # the recording moves last: it identifies the others
 
 
 def derive(folder: SessionFolder, state: SessionState) -> None:
-    """Bring the files of a session in line with what its journal gives.
+    """Bring the files of a session in line with its journal.
 
-    A call that was cut short can be repeated; where all is in line nothing is written.
+    An interrupted call can be repeated; files already in line are not written.
 
     Args:
         folder: the session, its lock held.
-        state: what its whole journal gives.
+        state: state after the whole journal.
 
     Raises:
         TrialFileError: the disk is full or gone, or another file stands in the way.
     """
     if state.phase is SessionPhase.PLANNED:
-        return  # what else is there would be the only witness of a lost journal
+        return  # any files are the only evidence of a lost journal
     recorded = [a for a in state.attempts if a.is_recorded or a.verdicts]
-    for attempt in sorted(recorded, key=lambda a: not a.is_rejected):  # makes room
+    for attempt in sorted(
+        recorded, key=lambda a: not a.is_rejected
+    ):  # frees names in trials/
         _derive_trial(folder, attempt, recorded)
     _write_changed(folder.path / SUMMARY_FILE, _summary_of(folder, state))
 
 
 def sidecar_of(folder: SessionFolder, attempt: Attempt) -> dict[str, Any]:
-    """Return what the sidecar of an attempt has to say, whatever it says now.
+    """Return the sidecar that an attempt should have, regardless of the file.
 
     Raises:
-        TrialFileError: what the journal left to the sidecar cannot be read now.
+        TrialFileError: figures that only the sidecar has cannot be read at present.
     """
-    other = {} if attempt.recording else _recording_elsewhere(folder, attempt)
+    other = {} if attempt.recording else _recording_from_files(folder, attempt)
     return attempt.sidecar(other)
 
 
@@ -63,7 +67,7 @@ def kept_sidecars(folder: SessionFolder) -> list[dict[str, Any]]:
 
 
 def read_recording(path: Path) -> dict[str, object]:
-    """Return the numbers of a recording as its file shows them.
+    """Return the figures of a recording from its file.
 
     The file does not state the displacement, which is left at 0.
     """
@@ -82,27 +86,27 @@ def read_recording(path: Path) -> dict[str, object]:
 def _derive_trial(
     folder: SessionFolder, attempt: Attempt, others: Sequence[Attempt]
 ) -> None:
-    """Give the files of an attempt their place, and its sidecar its content."""
-    place, other = folder.path / attempt.place, _other_place(folder, attempt)
-    is_elsewhere = _is_elsewhere(folder, attempt, others)
-    for suffix in _SUFFIXES if is_elsewhere else ():
-        if is_there(_file(other, suffix)):
-            _move(_file(other, suffix), _file(place, suffix))
-    _write_changed(_file(place, ".json"), sidecar_of(folder, attempt))
-    if is_elsewhere and is_there(_file(other, ".json")):
-        remove_file(_file(other, ".json"))
+    """Move the files of an attempt to their location and write its sidecar."""
+    target, previous = folder.path / attempt.place, _previous_path(folder, attempt)
+    has_moved = _is_at_previous_path(folder, attempt, others)
+    for suffix in _SUFFIXES if has_moved else ():
+        if is_there(_file(previous, suffix)):
+            _move(_file(previous, suffix), _file(target, suffix))
+    _write_changed(_file(target, ".json"), sidecar_of(folder, attempt))
+    if has_moved and is_there(_file(previous, ".json")):
+        remove_file(_file(previous, ".json"))
 
 
 def _move(source: Path, target: Path) -> None:
-    """Move a file; in a copy of a session that a kill had left in both places, once."""
+    """Move a file; of two identical copies left by a kill, remove the source."""
     if is_there(target) and sha256_of(source) == sha256_of(target):
         remove_file(source)
     else:
         move_file(source, target)
 
 
-def _other_place(folder: SessionFolder, attempt: Attempt) -> Path:
-    """Return where the files of an attempt stood before the newest verdict."""
+def _previous_path(folder: SessionFolder, attempt: Attempt) -> Path:
+    """Return the location of an attempt's files before the newest verdict."""
     name = attempt.name
     at_trials, at_rejected = folder.trials / name.kept, folder.rejected / name.rejected
     return at_trials if attempt.is_rejected else at_rejected
@@ -112,44 +116,44 @@ def _file(stem: Path, suffix: str) -> Path:
     return stem.with_name(stem.name + suffix)
 
 
-def _is_elsewhere(
+def _is_at_previous_path(
     folder: SessionFolder, attempt: Attempt, others: Sequence[Attempt]
 ) -> bool:
-    """Return whether files of an attempt are at its other place.
+    """Return whether files of an attempt are at its previous location.
 
-    A name in rejected/ is that of one attempt. In trials/ all attempts at a trial have
-    the same: the checksum of the recording tells them apart, else the sidecar.
+    A name in rejected/ belongs to one attempt. In trials/ all attempts at a trial share
+    one name: the checksum of the recording tells them apart, else the sidecar.
     """
-    other = _other_place(folder, attempt)
+    other = _previous_path(folder, attempt)
     if not attempt.is_rejected:
         return any(is_there(_file(other, s)) for s in (*_SUFFIXES, ".json"))
-    states_it = _states(_file(other, ".json"), attempt)
+    is_named = _names_attempt(_file(other, ".json"), attempt)
     recording = _file(other, ".mcap")
-    is_missed = bool(attempt.sha256) and not is_there(
+    is_missing = bool(attempt.sha256) and not is_there(
         _file(folder.path / attempt.place, ".mcap")
     )
-    if not (states_it or is_missed):
+    if not (is_named or is_missing):
         return False
     if is_there(recording):
         digest = sha256_of(recording)
-        for one in others:
-            if one.sha256 == digest:
-                return one.name == attempt.name
-    return states_it
+        for candidate in others:
+            if candidate.sha256 == digest:
+                return candidate.name == attempt.name
+    return is_named
 
 
-def _states(sidecar: Path, attempt: Attempt) -> bool:
+def _names_attempt(sidecar: Path, attempt: Attempt) -> bool:
     name = attempt.name
     fields = read_json(sidecar)
     named = fields.get("trial", name.kept), fields.get("attempt")
     return named == (name.kept, name.attempt)
 
 
-def _recording_elsewhere(folder: SessionFolder, attempt: Attempt) -> dict[str, Any]:
-    """Return the numbers of a recording of which the journal states none."""
-    stems = folder.path / attempt.place, _other_place(folder, attempt)
+def _recording_from_files(folder: SessionFolder, attempt: Attempt) -> dict[str, Any]:
+    """Return the figures of a recording that the journal does not state."""
+    stems = folder.path / attempt.place, _previous_path(folder, attempt)
     for stem in stems:
-        if _states(_file(stem, ".json"), attempt):
+        if _names_attempt(_file(stem, ".json"), attempt):
             return read_json(_file(stem, ".json"))
     for stem in stems[:1] if attempt.is_rejected else stems:
         if is_there(_file(stem, ".mcap")):

@@ -1,4 +1,4 @@
-"""The journal of a session: its events, and the state and files that follow."""
+"""The journal of a session: its events, and the state and files derived from them."""
 
 from dataclasses import dataclass, field
 
@@ -17,8 +17,8 @@ class Journal:
 
     Attributes:
         folder: the session on the disk.
-        clock: of the times of the events.
-        state: what the events give.
+        clock: source of the times of events.
+        state: state after all events.
     """
 
     folder: SessionFolder
@@ -26,12 +26,12 @@ class Journal:
     state: SessionState = field(default_factory=SessionState)
 
     def append(self, event: str, **details: object) -> None:
-        """Append an event of now, apply it, and let the files follow.
+        """Append an event with the current time, apply it, and update the files.
 
-        An event that keeps a trial has the checksum and size of its file.
+        An event that keeps a trial contains the checksum and size of its file.
 
         Raises:
-            SessionError: the event cannot happen in this state.
+            SessionError: the event is not allowed in this state.
             TrialFileError: the disk is full or gone.
         """
         utc = iso_utc(self.clock.utc_ns())
@@ -46,18 +46,20 @@ class Journal:
         derive(self.folder, self.state)
 
     def _sums(self, entry: dict[str, object]) -> dict[str, object]:
-        """Return checksum and size of the trial that an event keeps."""
-        after, known = apply(self.state, entry).kept_trials, self.state.attempts
-        judged = [sidecar_of(self.folder, kept) for kept in after if kept not in known]
-        return sums_of(judged[0]) if judged else {}
+        """Checksum and size of the trial that an event keeps."""
+        after, before = apply(self.state, entry).kept_trials, self.state.attempts
+        sidecars = [
+            sidecar_of(self.folder, kept) for kept in after if kept not in before
+        ]
+        return sums_of(sidecars[0]) if sidecars else {}
 
     def saved(self) -> str:
-        """Return what is safe on the disk, for a message."""
+        """Message about the trials that are safe on the disk."""
         kept = len(self.state.kept)
         trials = "1 trial is" if kept == 1 else f"{kept} trials are"
         return f"{trials} safe in {self.folder.path}."
 
 
 def open_journal(folder: SessionFolder, clock: Clock) -> Journal:
-    """Return the journal of a session that is on the disk already."""
+    """Return the journal of an existing session."""
     return Journal(folder, clock, replay(folder.events()))

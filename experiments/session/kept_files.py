@@ -1,4 +1,4 @@
-"""Kept trials as the journal has them against the files: what is missing or changed."""
+"""Compare the kept trials of the journal with the files: missing, changed."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ _Facts = Mapping[str, Any]
 
 
 class KeptDataError(SessionError):
-    """Kept trials are missing, or are not what the journal says."""
+    """Kept trials are missing or contradict the journal."""
 
     exit_code = 6
 
 
 @dataclass(frozen=True, slots=True)
 class Deviation:
-    """One file of a session that is not what the journal says.
+    """One file of a session that contradicts the journal.
 
     Attributes:
         session: id of the session.
-        file: below the folder of the session.
-        problem: what is wrong, in words.
+        file: path relative to the folder of the session.
+        problem: description of the fault.
     """
 
     session: str
@@ -40,7 +40,7 @@ class Deviation:
     problem: str
 
     def text(self) -> str:
-        """Return it in one line."""
+        """Return the deviation in one line."""
         return f"{self.session} {self.file} {self.problem}"
 
 
@@ -49,11 +49,11 @@ def compare_kept(
 ) -> list[Deviation]:
     """Return every kept trial that is missing or changed, in the order of trials.
 
-    A trial whose files have yet to follow the journal is no deviation.
+    A trial whose files have not been moved yet as the journal demands is no deviation.
 
     Args:
         folder: the session.
-        digest: what computes the checksum of a file.
+        digest: function that computes the checksum of a file.
     """
     try:
         return [Deviation(folder.id, *pair) for pair in _compare(folder, digest)]
@@ -67,20 +67,20 @@ def _compare(
     """Return (file, problem) of every deviation.
 
     Raises:
-        TrialFileError: a file or folder that all depends on cannot be read.
+        TrialFileError: the journal or a folder cannot be read.
     """
     events, text = folder.events(), folder.journal_text()
     state = replay(events)
     faults = [(JOURNAL_FILE, fault) for fault in line_faults(text)]
-    if (otherwise := contradiction(folder, events)) is not None:
-        faults.append((otherwise.file, otherwise.problem))
+    if (deviation := contradiction(folder, events)) is not None:
+        faults.append((deviation.file, deviation.problem))
     judged = {attempt.name for attempt in state.attempts if attempt.verdicts}
     faults += _unknown_to_journal(folder, text, {name.kept for name in judged})
     for attempt in state.kept_trials:
         try:
             faults += _check_trial(folder, attempt, digest)
         except TrialFileError as error:
-            faults.append((_below(folder, error), error.reason))
+            faults.append((_relative_path(folder, error), error.reason))
     for path in list_folder(folder.trials, "T??.json"):
         fields = read_json(path)
         stem, attempt = path.stem, fields.get("attempt")
@@ -89,37 +89,37 @@ def _compare(
             faults.append((f"trials/{path.name}", "is kept, but is not in the journal"))
             attempt = attempt if type(attempt) is int else 1
             name = TrialName(int(stem[1:]), attempt) if stem[1:].isdigit() else None
-            if name is not None:  # the sidecar is the only one that knows the checksum
+            if name is not None:  # only the sidecar has the checksum
                 orphan = Attempt(name, sums=sums_of(fields))
                 faults += _check_trial(folder, orphan, digest)
     return faults
 
 
 def _unknown_to_journal(
-    folder: SessionFolder, text: bytes, told: Collection[str]
+    folder: SessionFolder, text: bytes, judged: Collection[str]
 ) -> list[tuple[str, str]]:
-    """Return what session.json knows of and the journal does not.
+    """Return the faults that session.json reveals in the journal.
 
-    session.json is written after the journal: it may be behind, where a trial was
-    rejected since, and never knows more.
+    session.json is written after the journal: it may lag behind, but never contains
+    more.
 
     Args:
         folder: the session.
         text: the journal.
-        told: names of the trials of which it has a verdict.
+        judged: names of the trials with a verdict in the journal.
     """
     summary = read_json(folder.path / SUMMARY_FILE)
     listed = summary.get("kept")
     names = cast("list[object]", listed if isinstance(listed, list) else [])
-    known = [str(name) for name in names]
+    summarised = [str(name) for name in names]
     faults: list[tuple[str, str]] = []
     if origin := stated_id(folder):
         faults.append((SUMMARY_FILE, f"is of {origin}: a copy, or a renamed session"))
     lines, stated = text.count(b"\n"), summary.get("events")
     if lines > 1 and not summary:
         faults.append((SUMMARY_FILE, "is missing or damaged"))
-    lost = [name for name in known if name not in told]
-    if not text and (known or stated):
+    lost = [name for name in summarised if name not in judged]
+    if not text and (summarised or stated):
         faults.append((JOURNAL_FILE, f"is missing or empty; {SUMMARY_FILE} is not"))
     elif type(stated) is int and lines < stated:
         faults.append((JOURNAL_FILE, f"ends after {lines} of {stated} lines"))
@@ -131,14 +131,14 @@ def _unknown_to_journal(
 
 
 def contradiction(folder: SessionFolder, events: Sequence[_Facts]) -> Deviation | None:
-    """Return what is said otherwise than by the folder's name; None = nothing.
+    """Return how journal or session.json contradict the folder's name, or None.
 
-    A name decides where a session counts, and whether as a simulated one. The journal
-    and session.json know it too.
+    The name decides for which terrain a session counts, and whether as simulated; both
+    files state the same.
     """
     stated = read_json(folder.path / SUMMARY_FILE).get("simulated")
     if isinstance(stated, bool) and stated is not folder.is_simulated:
-        return _of_the_other_kind(folder, SUMMARY_FILE, is_simulated=stated)
+        return _wrong_kind(folder, SUMMARY_FILE, is_simulated=stated)
     if not events or events[0].get("event") != Event.STARTED:
         return None
     first = events[0]
@@ -147,19 +147,17 @@ def contradiction(folder: SessionFolder, events: Sequence[_Facts]) -> Deviation 
         return Deviation(folder.id, JOURNAL_FILE, f"is of {terrain}: a renamed session")
     is_simulated = first.get("fake", folder.is_simulated or None) is not None
     if is_simulated is not folder.is_simulated:
-        return _of_the_other_kind(folder, JOURNAL_FILE, is_simulated=is_simulated)
+        return _wrong_kind(folder, JOURNAL_FILE, is_simulated=is_simulated)
     return None
 
 
-def _of_the_other_kind(
-    folder: SessionFolder, file: str, *, is_simulated: bool
-) -> Deviation:
+def _wrong_kind(folder: SessionFolder, file: str, *, is_simulated: bool) -> Deviation:
     kind = "simulated" if is_simulated else "recorded"
     return Deviation(folder.id, file, f"is of {kind} trials: a renamed session")
 
 
 def repeated_numbers(folders: Sequence[SessionFolder]) -> dict[Path, Deviation]:
-    """Return a deviation for each session that has the number of one before it."""
+    """Deviations of the sessions whose number an earlier session has, by folder."""
     first: dict[str, SessionFolder] = {}
     return {
         folder.path: Deviation(
@@ -171,43 +169,43 @@ def repeated_numbers(folders: Sequence[SessionFolder]) -> dict[Path, Deviation]:
 
 
 def stated_id(folder: SessionFolder) -> str:
-    """Return the id that session.json states where it is not the folder's, else ""."""
+    """Return the id in session.json if it differs from the folder's, else ""."""
     stated = read_json(folder.path / SUMMARY_FILE).get("id")
     return stated if isinstance(stated, str) and stated != folder.id else ""
 
 
 def repeated_trials(folder: SessionFolder, original: SessionFolder) -> set[str]:
-    """Return the names of the trials of a copy that its original has as well."""
+    """Names of the trials that a copied session shares with its original."""
     sums = [
-        {kept.name.kept: kept.sha256 for kept in replay(one.events()).kept_trials}
-        for one in (folder, original)
+        {kept.name.kept: kept.sha256 for kept in replay(session.events()).kept_trials}
+        for session in (folder, original)
     ]
     return {name for name, sha256 in sums[0].items() if sums[1].get(name) == sha256}
 
 
-def _below(folder: SessionFolder, error: TrialFileError) -> str:
-    """Return the file of an error, below the folder of the session."""
+def _relative_path(folder: SessionFolder, error: TrialFileError) -> str:
+    """File of an error, relative to the folder of the session."""
     is_below = error.path.is_relative_to(folder.path)
     return str(error.path.relative_to(folder.path) if is_below else error.path)
 
 
 def unreadable(folder: SessionFolder, error: TrialFileError) -> Deviation:
-    """Return a file that leads out of the session as a deviation."""
-    return Deviation(folder.id, _below(folder, error), error.reason)
+    """Return an unreadable file as a deviation."""
+    return Deviation(folder.id, _relative_path(folder, error), error.reason)
 
 
 def compare_trial(folder: SessionFolder, path: Path) -> list[Deviation]:
-    """Return what `compare_kept` says of the file of one trial."""
+    """Deviations of one trial, as of `compare_kept`."""
     return [d for d in compare_kept(folder) if Path(d.file).stem == path.stem]
 
 
 def check_kept(
     sessions: Sequence[SessionFolder], *, allow_missing: bool
 ) -> list[Deviation]:
-    """Return the deviations of all `sessions`; without permission there are none.
+    """Return the deviations of all `sessions`; refuses them unless allowed.
 
     Raises:
-        KeptDataError: there are some, and `allow_missing` is false.
+        KeptDataError: there are deviations, and `allow_missing` is false.
     """
     deviations = [d for session in sessions for d in compare_kept(session)]
     if deviations and not allow_missing:
@@ -216,7 +214,7 @@ def check_kept(
 
 
 def kept_data_error(deviations: Sequence[Deviation]) -> KeptDataError:
-    """Return the refusal of data that are not what the journal says."""
+    """Return the error for data that contradict the journal."""
     named = "; ".join(d.text() for d in deviations[:_NAMED])
     more = f"; and {len(deviations) - _NAMED} more" if deviations[_NAMED:] else ""
     return KeptDataError(
@@ -228,9 +226,9 @@ def kept_data_error(deviations: Sequence[Deviation]) -> KeptDataError:
 def _check_trial(
     folder: SessionFolder, kept: Attempt, digest: Callable[[Path], str]
 ) -> list[tuple[str, str]]:
-    """Return (file, problem) for each file of a kept trial that is not sound.
+    """Return (file, problem) for each faulty file of a kept trial.
 
-    Its files may have yet to follow the journal.
+    Its files may not have been moved yet as the journal demands.
     """
     name = kept.name
     stems = (folder.trials / name.kept, folder.rejected / name.rejected)
@@ -245,11 +243,11 @@ def _check_trial(
         return faults
     recordings = (stem.with_name(f"{stem.name}.mcap") for stem in stems)
     path = next((path for path in recordings if is_there(path)), None)
-    problem = _changed(path.stat().st_size, kept.size) if path else "is missing"
+    problem = _change_text(path.stat().st_size, kept.size) if path else "is missing"
     return [*faults, (f"trials/{name.kept}.mcap", problem)]
 
 
-def _changed(size: int, before: object) -> str:
+def _change_text(size: int, before: object) -> str:
     if type(before) is not int or size == before:
         return "is changed: its checksum is wrong"
     return f"is changed: {size} bytes, {before} were kept"

@@ -1,4 +1,4 @@
-"""One process per session: a lock that its owner's death opens."""
+"""One process per session: a file lock, released when its owner dies."""
 
 import json
 import os
@@ -15,7 +15,7 @@ from experiments.session.data_files import read_json
 from experiments.session.store import SessionFolder, iso_utc
 
 LOCK_FILE = ".lock"
-_TRIES = 5  # a reader holds the lock for a moment
+_TRIES = 5  # readers hold the lock briefly
 _PAUSE_NS = 10_000_000
 
 
@@ -24,7 +24,7 @@ class LockOwner:
     """The living process that has a session open.
 
     Attributes:
-        pid: its number, 0 where it is not written yet.
+        pid: process id, 0 if not written yet.
         since: time of day [UTC] at which it opened the session.
     """
 
@@ -34,11 +34,11 @@ class LockOwner:
 
 @contextmanager
 def session_lock(folder: SessionFolder) -> Generator[None]:
-    """Keep other processes out of the session while this lasts; a kill ends it too.
+    """Lock the session against other processes; a kill releases the lock too.
 
     Raises:
         SessionError: a living process has it open, or the folder cannot be written.
-        TrialFileError: the lock or a folder of the session lies elsewhere.
+        TrialFileError: the lock or a folder is a link out of the session.
     """
     try:
         check_folders(folder.path)
@@ -58,10 +58,10 @@ def session_lock(folder: SessionFolder) -> Generator[None]:
 
 
 def owner_of(folder: SessionFolder) -> LockOwner | None:
-    """Return the living process that has the session open, None for none.
+    """Return the living process that has the session open, or None.
 
     Raises:
-        TrialFileError: the lock lies elsewhere, or cannot be opened now.
+        TrialFileError: the lock is a link out of the session, or cannot be opened.
     """
     path = folder.path / LOCK_FILE
     try:
@@ -77,7 +77,7 @@ def owner_of(folder: SessionFolder) -> LockOwner | None:
 
 
 def locked_error(folder: SessionFolder) -> SessionError:
-    """Return the refusal of a session that another process has open."""
+    """Return the error for a session that another process has open."""
     from experiments.messages import CATALOGUE
 
     owner = _signature(folder.path / LOCK_FILE)
@@ -100,7 +100,7 @@ def _take(descriptor: int) -> bool:
 
 
 def sign(descriptor: int) -> None:
-    """Write into an open lock file whose it is and since when."""
+    """Write owner and time into an open lock file."""
     since = iso_utc(SystemClock().utc_ns())
     text = json.dumps({"pid": os.getpid(), "since": since}).encode()
     os.ftruncate(descriptor, 0)

@@ -1,4 +1,4 @@
-"""conditions.json of a session: the conditions that it was recorded under, by name."""
+"""conditions.json of a session: its recording conditions by name."""
 
 from collections.abc import Mapping
 
@@ -18,6 +18,6 @@ def write_conditions(folder: SessionFolder, values: Mapping[str, str]) -> None:
 
 
 def read_conditions(folder: SessionFolder) -> dict[str, str]:
-    """Return the conditions of a session, none where the file is damaged."""
+    """Return the conditions of a session, empty if the file is damaged."""
     entries = read_json(folder.path / FILE)
     return {name: str(value) for name, value in entries.items()}

@@ -22,24 +22,24 @@ _Facts = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class SessionState:
-    """What the journal says of a session.
+    """State of a session after the events of its journal.
 
     Attributes:
-        phase: where it stands.
+        phase: phase of the session.
         terrain: name of the terrain.
-        operator: who opened it last.
-        wanted: how many kept trials make it complete.
+        operator: operator of the last opening.
+        wanted: number of kept trials that completes it.
         kept_attempts: (number, attempt) of the kept trials, in the order of keeping.
         attempts: every attempt so far, in the order of their names.
-        untared: the newest attempt of this opening that no tare has followed yet.
+        untared: newest attempt of this opening, until a tare follows it.
         running: number of the trial without a verdict, None between trials.
-        redoing: number of the trial that is to be repeated, None where none is.
-        is_redo: it was opened to repeat one trial and for nothing else.
-        openings: how often it was opened.
-        ended: why it ended: "complete", "unfinished", a fault; empty while open.
-        tares: how many tares were taken since it was opened.
-        first_bias, last_bias: what the sensor showed beside the foot's weight in the
-            first and in the last of them [N, N m]; empty before.
+        redoing: number of the trial to repeat, or None.
+        is_redo: whether it was opened only to repeat one trial.
+        openings: number of openings.
+        ended: reason of the end: "complete", "unfinished", a fault; empty while open.
+        tares: number of tares since it was opened.
+        first_bias, last_bias: sensor reading less the foot's weight at the first and
+            the last of these tares [N, N m]; empty before.
     """
 
     phase: SessionPhase = SessionPhase.PLANNED
@@ -60,9 +60,9 @@ class SessionState:
 
     @property
     def drift(self) -> tuple[float, ...]:
-        """What the force has drifted between first and last tare [N], three numbers.
+        """Drift of the force between first and last tare [N], three numbers.
 
-        Empty before there are two: the bracket is the force's uncertainty.
+        Empty with fewer than two tares. It bounds the uncertainty of the force.
         """
         if self.tares < 2:
             return ()
@@ -82,7 +82,7 @@ class SessionState:
 
     @property
     def rejected(self) -> int:
-        """How many attempts were rejected or interrupted."""
+        """Number of rejected or interrupted attempts."""
         return sum(attempt.is_rejected for attempt in self.attempts)
 
     @property
@@ -92,12 +92,12 @@ class SessionState:
 
     @property
     def is_over(self) -> bool:
-        """Whether there is nothing left to record in this opening."""
+        """Whether nothing is left to record in this opening."""
         return self.redoing is None if self.is_redo else self.is_complete
 
     @property
     def next_trial(self) -> int:
-        """Trial to be repeated, else the smallest number that has not been kept."""
+        """Trial to repeat, else the smallest number not kept yet."""
         if self.redoing is not None:
             return self.redoing
         number = 1
@@ -106,21 +106,21 @@ class SessionState:
         return number
 
     def attempt(self, number: int) -> int:
-        """Return how many attempts trial `number` has had, 0 before the first."""
+        """Number of attempts at trial `number`, 0 before the first."""
         own = (a.name.attempt for a in self.attempts if a.name.number == number)
         return max(own, default=0)
 
     def kept_attempt(self, number: int) -> int:
-        """Return which attempt at trial `number` is the kept one, 0 for none."""
+        """The kept attempt at trial `number`, 0 if none is kept."""
         return dict(self.kept_attempts).get(number, 0)
 
     def attempt_at(self, name: TrialName) -> Attempt:
-        """Return what the journal says of an attempt, nothing where it has none."""
-        known = (attempt for attempt in self.attempts if attempt.name == name)
-        return next(known, Attempt(name))
+        """Return an attempt by name, an empty one if the journal has none."""
+        matches = (attempt for attempt in self.attempts if attempt.name == name)
+        return next(matches, Attempt(name))
 
     def with_attempt(self, changed: Attempt) -> "SessionState":
-        """Return the state with `changed` in the place of the attempt of its name."""
+        """Return the state with `changed` replacing the attempt of that name."""
         others = [a for a in self.attempts if a.name != changed.name]
         attempts = sorted(
             [*others, changed], key=lambda a: (a.name.number, a.name.attempt)
@@ -129,7 +129,7 @@ class SessionState:
 
 
 def refusal(state: SessionState, event: _Facts) -> str:
-    """Return why `event` cannot happen now; empty where it can."""
+    """Return why `event` is not allowed now; empty if it is."""
     name = _EVENTS.get(str(event.get("event")))
     if name is None:
         return "this is not an event of a session"
@@ -157,42 +157,42 @@ def replay(events: Iterable[_Facts]) -> SessionState:
 
 
 def _next_phase(step: PhaseChange, state: SessionState) -> SessionPhase:
-    """Return where the step leads; of two ways the kept trials decide."""
+    """Return the next phase; of two, the kept trials decide."""
     if len(step.to) == 1:
         return step.to[0]
     (other,) = (phase for phase in step.to if phase is not SessionPhase.COMPLETE)
     return SessionPhase.COMPLETE if state.is_complete else other
 
 
-def _whole(event: _Facts, key: str) -> int:
-    """Return the whole number at `key`, 0 where there is none above 0."""
+def _positive_int(event: _Facts, key: str) -> int:
+    """Return the positive integer at `key`, else 0."""
     value = event.get(key)
     return value if type(value) is int and value > 0 else 0
 
 
 def _numbers(value: object) -> tuple[float, ...]:
-    """Return finite numbers of a list, nothing where there is anything else in it."""
+    """Return a list of finite floats as a tuple; empty for anything else."""
     entries = cast("list[object]", value) if isinstance(value, list) else []
     numbers = tuple(x for x in entries if type(x) is float and isfinite(x))
     return numbers if len(numbers) == len(entries) else ()
 
 
-# What a phase alone cannot know.
+# Checks that need more than the phase.
 def _check_start(state: SessionState, event: _Facts) -> str:
     del state
-    is_whole = bool(event.get("terrain")) and _whole(event, "trials")
+    is_whole = bool(event.get("terrain")) and _positive_int(event, "trials")
     return "" if is_whole else "it names no terrain and number of trials"
 
 
 def _check_redo(state: SessionState, event: _Facts) -> str:
-    number = _whole(event, "trial")
+    number = _positive_int(event, "trial")
     if state.running is not None:
-        return _judged(state, event)
+        return _check_no_running(state, event)
     return "" if state.attempt(number) else f"T{number:02d} was never recorded"
 
 
 def _check_new_trial(state: SessionState, event: _Facts) -> str:
-    number = _whole(event, "trial")
+    number = _positive_int(event, "trial")
     if number in state.kept:
         return f"T{number:02d} is kept"
     is_wanted = number and state.redoing in (None, number)
@@ -200,23 +200,23 @@ def _check_new_trial(state: SessionState, event: _Facts) -> str:
 
 
 def _check_running(state: SessionState, event: _Facts) -> str:
-    number = _whole(event, "trial")
+    number = _positive_int(event, "trial")
     is_it = number and number == state.running
     return "" if is_it else f"T{number:02d} is not running"
 
 
-def _check_aside(state: SessionState, event: _Facts) -> str:
-    number = _whole(event, "trial")
+def _check_set_aside(state: SessionState, event: _Facts) -> str:
+    number = _positive_int(event, "trial")
     is_it = number == state.redoing and number in state.kept
     return "" if is_it else f"T{number:02d} is not a kept trial to be repeated"
 
 
 def _check_verdict(state: SessionState, event: _Facts) -> str:
-    number, attempt = _whole(event, "trial"), _whole(event, "attempt")
+    number, attempt = _positive_int(event, "trial"), _positive_int(event, "attempt")
     if not 1 <= attempt <= state.attempt(number):
         return "there is no such attempt"
     if number == state.running and attempt == state.attempt(number):
-        return _judged(state, event)
+        return _check_no_running(state, event)
     if event.get("verdict") not in (KEEP, REJECT):
         return "a verdict is keep or reject"
     kept = state.kept_attempt(number)
@@ -225,8 +225,8 @@ def _check_verdict(state: SessionState, event: _Facts) -> str:
     return ""
 
 
-def _judged(state: SessionState, event: _Facts) -> str:
-    """Return a refusal while a crashed trial has not been put away."""
+def _check_no_running(state: SessionState, event: _Facts) -> str:
+    """Refuse while a trial cut off by a crash has no verdict."""
     del event
     if state.running is None or state.phase is not SessionPhase.CRASHED:
         return ""
@@ -235,22 +235,22 @@ def _judged(state: SessionState, event: _Facts) -> str:
 
 _CHECKS: Mapping[Event, Callable[[SessionState, _Facts], str]] = {
     Event.STARTED: _check_start,
-    Event.RESUMED: _judged,
+    Event.RESUMED: _check_no_running,
     Event.REDO: _check_redo,
-    Event.SET_ASIDE: _check_aside,
+    Event.SET_ASIDE: _check_set_aside,
     Event.TRIAL_STARTED: _check_new_trial,
     Event.TRIAL_RECORDED: _check_running,
     Event.TRIAL_KEPT: _check_running,
     Event.TRIAL_REJECTED: _check_running,
     Event.VERDICT: _check_verdict,
-    Event.ENDED: _judged,
-    Event.GIVEN_UP: _judged,
+    Event.ENDED: _check_no_running,
+    Event.GIVEN_UP: _check_no_running,
 }
 
 
-# What an event changes beside the phase.
+# Changes other than the phase.
 def _start(state: SessionState, event: _Facts) -> SessionState:
-    terrain, wanted = str(event["terrain"]), _whole(event, "trials")
+    terrain, wanted = str(event["terrain"]), _positive_int(event, "trials")
     return _open(replace(state, terrain=terrain, wanted=wanted), event)
 
 
@@ -263,7 +263,7 @@ def _open(state: SessionState, event: _Facts) -> SessionState:
 
 
 def _redo(state: SessionState, event: _Facts) -> SessionState:
-    number = _whole(event, "trial")
+    number = _positive_int(event, "trial")
     return replace(_open(state, event), redoing=number, is_redo=True)
 
 
@@ -276,7 +276,7 @@ def _tare(state: SessionState, event: _Facts) -> SessionState:
     bias = _numbers(event.get("bias"))
     if len(bias) != _AXES:
         return state
-    t_ns = _whole(event, "t_ns")
+    t_ns = _positive_int(event, "t_ns")
     if state.untared is not None and t_ns:
         before = state.attempt_at(state.untared)
         tare = {"t_ns": t_ns, "bias": list(bias)}
@@ -286,7 +286,7 @@ def _tare(state: SessionState, event: _Facts) -> SessionState:
 
 
 def _start_trial(state: SessionState, event: _Facts) -> SessionState:
-    number = _whole(event, "trial")
+    number = _positive_int(event, "trial")
     name = TrialName(number, state.attempt(number) + 1)
     return replace(state.with_attempt(Attempt(name)), running=number)
 
@@ -299,8 +299,8 @@ def _record(state: SessionState, event: _Facts) -> SessionState:
 
 def _keep(state: SessionState, event: _Facts) -> SessionState:
     attempt = _running(state)
-    # A line that is lost may have begun an attempt: this one states its own.
-    newest = max(attempt.name.attempt, _whole(event, "attempt"))
+    # The line that started an attempt may be lost: this one states its number.
+    newest = max(attempt.name.attempt, _positive_int(event, "attempt"))
     others = tuple(other for other in state.attempts if other != attempt)
     kept = replace(attempt, name=TrialName(attempt.name.number, newest))
     redoing = None if state.redoing == kept.name.number else state.redoing
@@ -314,13 +314,13 @@ def _reject(state: SessionState, event: _Facts) -> SessionState:
 
 
 def _set_aside(state: SessionState, event: _Facts) -> SessionState:
-    number = _whole(event, "trial")
+    number = _positive_int(event, "trial")
     name = TrialName(number, state.kept_attempt(number))
     return _judge(state, state.attempt_at(name), REJECT, event)
 
 
 def _change_verdict(state: SessionState, event: _Facts) -> SessionState:
-    number, attempt = _whole(event, "trial"), _whole(event, "attempt")
+    number, attempt = _positive_int(event, "trial"), _positive_int(event, "attempt")
     is_kept = state.kept_attempt(number) == attempt
     is_changed = is_kept != (event.get("verdict") == KEEP)
     if is_changed and state.is_redo and state.phase is SessionPhase.READY:
@@ -330,7 +330,7 @@ def _change_verdict(state: SessionState, event: _Facts) -> SessionState:
 
 
 def _note(state: SessionState, event: _Facts) -> SessionState:
-    name = TrialName(_whole(event, "trial"), _whole(event, "attempt"))
+    name = TrialName(_positive_int(event, "trial"), _positive_int(event, "attempt"))
     if not 1 <= name.attempt <= state.attempt(name.number):
         return state  # of the session
     attempt = state.attempt_at(name)
@@ -361,7 +361,7 @@ def _running(state: SessionState) -> Attempt:
 
 
 def _with_recording(attempt: Attempt, event: _Facts) -> Attempt:
-    """Return the attempt with the numbers of its recording that an event brought."""
+    """Return the attempt with the recording's figures from `event`."""
     recording = event.get("recording")
     if not isinstance(recording, Mapping):
         return attempt

@@ -1,4 +1,4 @@
-"""An attempt at a trial: its name, what the journal says of it, and its sidecar."""
+"""An attempt at a trial: its name, its entries in the journal, and its sidecar."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from acquisition.trial_file.verify import VerifiedFile
 
 KEEP, REJECT = "keep", "reject"
-TIME_LIMIT = 30.0  # s, a trial is over then
+TIME_LIMIT = 30.0  # s, longest trial
 COMPLETE = frozenset({"travel", "key", "time-limit"})
 _SUMS = {"sha256": str, "size": int}
 
@@ -31,21 +31,21 @@ class TrialName:
     def rejected(self) -> str:
         """Name of the file in rejected/."""
         letters = ""
-        rest = self.attempt
-        while rest > 0:
-            rest, digit = divmod(rest - 1, 26)
+        number = self.attempt
+        while number > 0:
+            number, digit = divmod(number - 1, 26)
             letters = chr(ord("a") + digit) + letters
         return self.kept + letters
 
 
 @dataclass(slots=True)
 class TrialOutcome:
-    """How a recording ended.
+    """End of a recording.
 
     Attributes:
         reason: "travel", "key", "time-limit", "interrupted" or a fault's name.
-        seconds: since the start [s].
-        displacement: of the foot along the container [m].
+        seconds: time since the start [s].
+        displacement: displacement of the foot along the container [m].
     """
 
     reason: str
@@ -54,14 +54,14 @@ class TrialOutcome:
 
     @property
     def status(self) -> str:
-        """The program's grade of the trial, never a verdict."""
+        """Automatic grade of the trial; a verdict is the operator's."""
         return "complete" if self.reason in COMPLETE else "interrupted"
 
 
 def recording_of(
     verified: VerifiedFile | None, outcome: TrialOutcome
 ) -> dict[str, object]:
-    """Return what the journal states of a recording; no file where None."""
+    """Return the figures of a recording for the journal; None = no file."""
     return {
         "sha256": verified.sha256 if verified else "",
         "size": verified.size if verified else 0,
@@ -79,9 +79,9 @@ class Verdict:
     """A verdict on an attempt.
 
     Attributes:
-        verdict: "keep" or "reject"; "" for none yet.
-        reason: why; may be empty for "keep".
-        who: whose verdict it is.
+        verdict: "keep" or "reject"; "" before the first.
+        reason: reason; may be empty for "keep".
+        who: author.
         when: UTC as text.
     """
 
@@ -97,14 +97,14 @@ class Attempt:
 
     Attributes:
         name: number and attempt.
-        is_recorded: its recording was ended and verified.
-        recording: numbers of the recording and of its review; empty in journals that
+        is_recorded: whether its recording was completed and verified.
+        recording: figures of the recording and of its review; empty in journals that
             left them to the sidecar.
         sums: checksum and size as of the newest event that kept it.
-        verdicts: every verdict on it, oldest first.
-        notes: remarks on it: `text`, `who` and `when`.
-        next_tare: the tare that followed it: `t_ns`, its host time [ns], and `bias`,
-            the reading without load [N, N m]; empty before.
+        verdicts: all verdicts, oldest first.
+        notes: remarks: `text`, `who` and `when`.
+        next_tare: the following tare: `t_ns`, its host time [ns], and `bias`, the
+            reading without load [N, N m]; empty before.
     """
 
     name: TrialName
@@ -122,7 +122,7 @@ class Attempt:
 
     @property
     def is_rejected(self) -> bool:
-        """Whether its files belong into rejected/."""
+        """Whether its files belong in rejected/."""
         return self.verdict.verdict == REJECT
 
     @property
@@ -132,21 +132,21 @@ class Attempt:
 
     @property
     def place(self) -> str:
-        """The same with the folder: "trials/T04"."""
+        """`stem` with the folder: "trials/T04"."""
         return f"{'rejected' if self.is_rejected else 'trials'}/{self.stem}"
 
     @property
     def sha256(self) -> str:
-        """Checksum of the recording; empty where the journal states none."""
+        """Checksum of the recording; empty if the journal states none."""
         return str({**self.recording, **self.sums}.get("sha256", ""))
 
     @property
     def size(self) -> object:
-        """Size of the recording [bytes]; None where the journal states none."""
+        """Size of the recording [bytes]; None if the journal states none."""
         return {**self.recording, **self.sums}.get("size")
 
     def judged(self, verdict: Verdict) -> Attempt:
-        """Return the attempt after a verdict; one that is repeated changes nothing."""
+        """Return the attempt with a new verdict; an equal one changes nothing."""
         if verdict == self.verdict:
             return self
         return replace(self, verdicts=(*self.verdicts, verdict))
@@ -155,7 +155,7 @@ class Attempt:
         """Return the content of the sidecar.
 
         Args:
-            other: numbers of the recording from elsewhere; used where the journal
+            other: figures of the recording from its files, used if the journal
                 states none.
         """
         fields = {

@@ -1,4 +1,4 @@
-"""The life of a session as one table: in which phase which event leads where."""
+"""State machine of a session: one table of (phase, event) to next phase."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class SessionPhase(StrEnum):
-    """Where a session stands."""
+    """Phase of a session."""
 
     PLANNED = "planned"
     PREFLIGHT = "preflight"
@@ -21,7 +21,7 @@ class SessionPhase(StrEnum):
 
 
 class Event(StrEnum):
-    """What the journal says has happened."""
+    """Event in the journal."""
 
     STARTED = "session-started"
     RESUMED = "session-resumed"
@@ -44,11 +44,11 @@ class Event(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class PhaseChange:
-    """What an event does in a phase.
+    """Effect of an event in a phase.
 
     Attributes:
-        to: phases it may lead to; of two, the kept trials decide which.
-        refused: why it cannot happen; empty where it can.
+        to: possible next phases; of two, the kept trials decide which.
+        refused: why the event is not allowed; empty if it is.
     """
 
     to: tuple[SessionPhase, ...] = ()
@@ -66,18 +66,18 @@ OPEN = frozenset(
 )
 RESUMABLE = frozenset({SessionPhase.UNFINISHED, SessionPhase.CRASHED})
 _AT_REST = (SessionPhase.UNFINISHED, SessionPhase.COMPLETE)
-_Ways = Mapping[SessionPhase, tuple[SessionPhase, ...]]
+_Transitions = Mapping[SessionPhase, tuple[SessionPhase, ...]]
 
 
-def _stay(*phases: SessionPhase) -> _Ways:
+def _stay(*phases: SessionPhase) -> _Transitions:
     return {phase: (phase,) for phase in phases}
 
 
-def _lead(to: SessionPhase, *phases: SessionPhase) -> _Ways:
+def _lead(to: SessionPhase, *phases: SessionPhase) -> _Transitions:
     return dict.fromkeys(phases, (to,))
 
 
-_WAYS: Mapping[Event, _Ways] = {
+_TRANSITIONS: Mapping[Event, _Transitions] = {
     Event.STARTED: _lead(SessionPhase.PREFLIGHT, SessionPhase.PLANNED),
     Event.RESUMED: _lead(SessionPhase.PREFLIGHT, *RESUMABLE, SessionPhase.CLOSED),
     Event.REDO: _lead(
@@ -115,7 +115,7 @@ _WAYS: Mapping[Event, _Ways] = {
             ),
             _AT_REST,
         ),
-        # A trial that was left without a verdict is what a crash leaves.
+        # A trial left without a verdict counts as a crash.
         **_lead(SessionPhase.CRASHED, SessionPhase.RECORDING, SessionPhase.REVIEW),
     },
     Event.GIVEN_UP: _lead(SessionPhase.CLOSED, *RESUMABLE),
@@ -138,7 +138,7 @@ _OPENING = frozenset({Event.STARTED, Event.RESUMED, Event.REDO, Event.GIVEN_UP})
 
 
 def _step(phase: SessionPhase, event: Event) -> PhaseChange:
-    to = _WAYS[event].get(phase, ())
+    to = _TRANSITIONS[event].get(phase, ())
     if to:
         return PhaseChange(to)
     if event is Event.STARTED and phase is not SessionPhase.PLANNED:
@@ -154,7 +154,7 @@ TABLE: Mapping[tuple[SessionPhase, Event], PhaseChange] = {
 
 
 def table_lines() -> list[str]:
-    """Return the table for people: one line per pair, phase by phase."""
+    """Return the table as text: one line per pair, phase by phase."""
     lines: list[str] = []
     for (phase, event), step in TABLE.items():
         result = f"refused: {step.refused}"

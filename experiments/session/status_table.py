@@ -33,8 +33,8 @@ def see_sessions(
 
     Args:
         data: the data folder.
-        where: checksums are computed only of sessions with these values.
-        digest: computes the checksum of a file.
+        where: checksums are computed only for sessions with these values.
+        digest: function that computes the checksum of a file.
     """
     seen: list[SeenSession] = []
     for folder in list_sessions(data):
@@ -45,9 +45,9 @@ def see_sessions(
 
 
 def _counted_once(seen: list[SeenSession]) -> list[SeenSession]:
-    """Return the sessions without those trials of a copy that its original has.
+    """Return the sessions, with trials shared by a copy and its original counted once.
 
-    A session that has the number of another one does not count.
+    A session with the number of an earlier one does not count.
     """
     from experiments.session.kept_files import (
         repeated_numbers,
@@ -55,16 +55,16 @@ def _counted_once(seen: list[SeenSession]) -> list[SeenSession]:
         stated_id,
     )
 
-    again_numbered = repeated_numbers([session.folder for session in seen])
+    duplicates = repeated_numbers([session.folder for session in seen])
     folders = {s.folder.id: s.folder for s in seen if s.summary.problem is None}
     result: list[SeenSession] = []
     for folder, summary in ((s.folder, s.summary) for s in seen):
-        # what was copied is not sound: it states another id
+        # a copy is not sound: it states another id
         is_asked = summary.problem is None and not summary.is_sound
         original = folders.get(stated_id(folder)) if is_asked else None
         again = set[str]() if original is None else repeated_trials(folder, original)
         kept = tuple(name for name in summary.kept if name not in again)
-        problem = summary.problem or again_numbered.get(folder.path)
+        problem = summary.problem or duplicates.get(folder.path)
         counted = replace(summary, kept=kept, problem=problem)
         result.append(SeenSession(folder, counted))
     return result
@@ -72,16 +72,16 @@ def _counted_once(seen: list[SeenSession]) -> list[SeenSession]:
 
 @dataclass(frozen=True, slots=True)
 class MatrixRow:
-    """One terrain, live or simulated: what is kept of what is wanted.
+    """One terrain, live or simulated: kept against planned trials.
 
     Attributes:
-        terrain: its name.
-        is_simulated: trials of simulated devices.
-        kept: how many verified trials are kept.
-        wanted: how many there are to be.
-        rejected: how many attempts were rejected or interrupted.
+        terrain: name of the terrain.
+        is_simulated: whether the devices were simulated.
+        kept: number of verified kept trials.
+        wanted: number of planned trials.
+        rejected: number of rejected or interrupted attempts.
         sessions: ids of the sessions.
-        trials: in how many sessions T01, T02 ... are kept, in this order.
+        trials: number of sessions in which T01, T02 ... are kept, in this order.
     """
 
     terrain: str
@@ -93,11 +93,11 @@ class MatrixRow:
     trials: tuple[int, ...]
 
     def as_dict(self) -> dict[str, object]:
-        """Return the line for JSON."""
+        """Return the row for JSON."""
         return asdict(self)
 
     def cells(self) -> str:
-        """Return one sign per trial: kept, kept in several sessions, missing."""
+        """Return one character per trial: kept, kept in several sessions, missing."""
         signs = {0: "·", 1: "█"}
         return "".join(signs.get(n, str(min(n, 9))) for n in self.trials)
 
@@ -107,15 +107,15 @@ def count_rows(
     matrix: MatrixSettings,
     where: Where = EVERYTHING,
 ) -> list[MatrixRow]:
-    """Return a line per terrain of the matrix, live first, simulated where there is.
+    """Return a row per terrain of the matrix: live, then simulated if recorded.
 
     Args:
         seen: the sessions.
-        matrix: the terrains, and how often each is recorded.
-        where: only terrains and sessions of which these hold.
+        matrix: the terrains and their number of trials.
+        where: conditions on terrains and sessions.
     """
     sessions = counted_of(seen, where)
-    lines: list[MatrixRow] = []
+    rows: list[MatrixRow] = []
     blocks = 1 + matrix.design.repeat_blocks
     for row in matrix.terrains:
         if not where.matches(facts_of_row(row)):
@@ -125,12 +125,12 @@ def count_rows(
             is_wanted = not is_simulated and where.matches({"kind": "live"})
             if own or (is_wanted and not {"session", "operator"} & where.keys):
                 wanted = row.trials * blocks
-                lines.append(_line(row, own, wanted, is_simulated=is_simulated))
-    return lines
+                rows.append(_matrix_row(row, own, wanted, is_simulated=is_simulated))
+    return rows
 
 
 def counted_of(seen: Sequence[SeenSession], where: Where) -> list[SeenSession]:
-    """Return the sessions with these values that can be read."""
+    """Return the readable sessions that match `where`."""
     return [
         s
         for s in seen
@@ -140,33 +140,33 @@ def counted_of(seen: Sequence[SeenSession], where: Where) -> list[SeenSession]:
 
 
 def is_of(session: SeenSession, row: TerrainRow, *, is_simulated: bool) -> bool:
-    """Return whether a session is of this terrain, and live or simulated as asked."""
+    """Return whether a session is of this terrain and kind."""
     folder = session.folder
     return folder.terrain == row.name and folder.is_simulated is is_simulated
 
 
 def find_deviations(seen: Sequence[SeenSession], where: Where) -> list[Deviation]:
-    """Return what is missing or changed of the kept trials in the table.
+    """Return the missing or changed kept trials of the table.
 
     Args:
         seen: the sessions.
-        where: only sessions with these values, as in `count_rows`; what cannot be
-            read is named of every session.
+        where: conditions on sessions, as in `count_rows`; unreadable sessions are
+            always reported.
     """
     asked = [s for s in seen if s.summary.problem or where.matches(s.facts)]
-    found = [d for s in asked for d in s.summary.deviations]
-    found += [s.summary.problem for s in seen if s.summary.problem is not None]
-    return list(dict.fromkeys(found))
+    deviations = [d for s in asked for d in s.summary.deviations]
+    deviations += [s.summary.problem for s in seen if s.summary.problem is not None]
+    return list(dict.fromkeys(deviations))
 
 
 def facts_of_row(row: TerrainRow) -> dict[str, Value]:
-    """Return what conditions can ask of a row of the matrix."""
+    """Facts of a row of the matrix that conditions can test."""
     fixed = {"terrain": row.name, "stones": row.stones, "incline_deg": row.incline_deg}
-    more = {"foot": row.foot, "push_deg": float(row.push_deg), "place": row.place}
-    return {**row.factors, **fixed, **more}
+    setup = {"foot": row.foot, "push_deg": float(row.push_deg), "place": row.place}
+    return {**row.factors, **fixed, **setup}
 
 
-def _line(
+def _matrix_row(
     row: TerrainRow,
     sessions: Sequence[SeenSession],
     wanted: int,

@@ -34,7 +34,7 @@ from experiments.session.sidecar import Attempt
 
 JOURNAL_FILE = "events.jsonl"
 SUMMARY_FILE = "session.json"  # written after each line of the journal
-FOLDS = ".folds"  # below the data: finished folds, so that a study resumes
+FOLDS = ".folds"  # in the data folder: finished folds, so that a study resumes
 _FOLDER = re.compile(
     r"^(?P<date>\d{4}-\d\d-\d\d)_(?P<id>S\d{3,})_(?P<terrain>(?:[A-Za-z0-9+-]|\.\d)+)"
     r"(?P<fake>\.fake)?$"
@@ -51,7 +51,7 @@ class SessionFolder:
         path: its folder.
         id: such as "S012".
         terrain: name of the terrain.
-        is_simulated: the folder ends in .fake.
+        is_simulated: whether the folder ends in .fake.
     """
 
     path: Path
@@ -75,9 +75,9 @@ class SessionFolder:
         return self.path / "faults"
 
     def append_event(self, event: Mapping[str, object]) -> int:
-        """Append one line to the journal, force it to the disk; return its number.
+        """Append one line to the journal and sync it; returns its number.
 
-        A line that a kill has torn is ended first, so that it spoils no other.
+        A torn last line is terminated first, so that it does not damage the new one.
 
         Raises:
             TrialFileError: the disk is full or gone.
@@ -87,7 +87,7 @@ class SessionFolder:
             descriptor = open_data(path, os.O_RDWR | os.O_APPEND | os.O_CREAT)
             with os.fdopen(descriptor, "r+b") as file:
                 is_new = not file.seek(0, os.SEEK_END)
-                if is_new:  # a journal whose name is lost would take all with it
+                if is_new:  # a new journal must not lose its name
                     sync_directory(self.path)
                 file.seek(0)
                 before = file.read()
@@ -100,11 +100,11 @@ class SessionFolder:
         return number
 
     def journal_text(self) -> bytes:
-        """Return the journal as it is on the disk, empty where there is none.
+        """Return the journal as bytes, empty if there is none.
 
         Raises:
-            TrialFileError: it, or a folder of the session, is none of its own; or it is
-                too long.
+            TrialFileError: the journal or a folder is a link out of the session; or it
+                is too long.
         """
         check_folders(self.path)
         path = self.path / JOURNAL_FILE
@@ -118,10 +118,10 @@ class SessionFolder:
         return text
 
     def events(self) -> list[dict[str, Any]]:
-        """Return the journal; torn lines and those of a wrong checksum are left out.
+        """Return the journal without torn lines and lines of a wrong checksum.
 
         Raises:
-            TrialFileError: as `journal_text`, or it is of another version.
+            TrialFileError: as `journal_text`, or the journal has another version.
         """
         text = self.journal_text()
         if problem := journal_problem(text):
@@ -130,20 +130,20 @@ class SessionFolder:
         return [event for event in lines if event is not None]
 
     def kept_trials(self, digest: Callable[[Path], str] | None = None) -> list[Path]:
-        """Return the files of the kept trials whose checksum is right, in order.
+        """Return the files of the kept trials with the right checksum, in order.
 
-        The journal decides which are kept and what is right; where a kill has cut a
-        verdict short, the file has yet to leave rejected/.
+        The journal decides. After a kill during a verdict the file may still be in
+        rejected/.
 
         Args:
-            digest: what computes the checksum of a file; None = `sha256_of`.
+            digest: function that computes a checksum; None = `sha256_of`.
         """
         kept = replay(self.events()).kept_trials
         files = (self.find_kept(attempt, digest or sha256_of) for attempt in kept)
         return [path for path in files if path is not None]
 
     def find_kept(self, kept: Attempt, digest: Callable[[Path], str]) -> Path | None:
-        """Return the file of a kept trial; None where none has the right checksum."""
+        """Return the file of a kept trial; None if none has the right checksum."""
         name = kept.name
         at_trials = self.trials / f"{name.kept}.mcap"
         for path in (at_trials, self.rejected / f"{name.rejected}.mcap"):
@@ -164,7 +164,7 @@ def list_sessions(data: Path) -> list[SessionFolder]:
 
 
 def unnamed_sessions(data: Path) -> list[Path]:
-    """Return folders below `data` that hold a journal and are not called like one.
+    """Return folders with a journal whose name is not that of a session.
 
     Raises:
         TrialFileError: the folder cannot be listed.
@@ -180,7 +180,7 @@ def find_session(data: Path, name: str) -> SessionFolder:
     """Return the session called `name`: an id, a folder name or a path.
 
     Raises:
-        SessionError: there is none, or more than one.
+        SessionError: no session matches, or several.
     """
     as_path = _session_at(Path(name))
     if as_path is not None and as_path.path.is_dir():
@@ -197,7 +197,7 @@ def find_session(data: Path, name: str) -> SessionFolder:
     if os.path.isfile(name):  # noqa: PTH113 - no error for a name that no file can have
         raise SessionError(
             f"{name} is a file, and no session.",
-            hint=_reads_it(Path(name)),
+            hint=_file_hint(Path(name)),
         )
     known = " ".join(s.id for s in list_sessions(data)) or "none yet"
     raise SessionError(
@@ -206,8 +206,8 @@ def find_session(data: Path, name: str) -> SessionFolder:
     )
 
 
-def _reads_it(path: Path) -> str:
-    """Return what reads a file that was given for a session."""
+def _file_hint(path: Path) -> str:
+    """Advice for a file given in place of a session."""
     session = _session_at(path.absolute().parent.parent)
     if session is not None and path.suffix == ".mcap":
         return f"Name its session: {session.id}; replay takes the trial beside it."
@@ -225,7 +225,7 @@ def create_session(
         SettingsError: `data` cannot be written.
     """
     sessions = data / "sessions"
-    made: Path | None = None
+    created: Path | None = None
     try:
         make_directories(sessions)
         with _locked(sessions / ".lock"):
@@ -235,14 +235,14 @@ def create_session(
             suffix = ".fake" if is_simulated else ""
             path = sessions / f"{date}_S{number:03d}_{terrain}{suffix}"
             path.mkdir()
-            made = path
+            created = path
         for name in ("trials", "rejected", "faults"):
             (path / name).mkdir()
         sync_directory(path)
         sync_directory(sessions)
     except OSError as error:
-        if made is not None:  # by this call, and empty but for folders
-            shutil.rmtree(made, ignore_errors=True)
+        if created is not None:  # by this call; contains only folders
+            shutil.rmtree(created, ignore_errors=True)
         raise SettingsError(
             f"{data} cannot be written ({error.strerror}).",
             hint="Name another folder with --data. Nothing was started.",
@@ -268,7 +268,7 @@ def _locked(path: Path) -> Generator[None, None, None]:
 
 
 def session_utc_ns() -> int:
-    """Return the machine's UTC [ns]: folders carry the real date, fake or not."""
+    """Return the machine's UTC [ns]: simulated sessions have the real date too."""
     return SystemClock().utc_ns()
 
 

@@ -1,4 +1,4 @@
-"""What the status table needs of one session."""
+"""Summaries of sessions for the status table."""
 
 from __future__ import annotations
 
@@ -22,18 +22,17 @@ _FACTORS = "terrain.factors."  # before the name of a condition
 
 @dataclass(frozen=True, slots=True)
 class SessionSummary:
-    """One session as the table counts it.
+    """Summary of one session for the status table.
 
     Attributes:
         kept: names of the kept trials whose checksum is right, "T01".
-        rejected: how many attempts were rejected or interrupted.
-        is_resumable: its journal leaves something to be recorded, or to be put away.
-        operator: who opened it last.
-        phase: where it stands; "opening" before its first event.
-        deviations: what is missing or changed of the kept trials.
-        problem: what leads out of the session, cannot be read or contradicts its name;
-            None for nothing.
-            Such a session is not counted.
+        rejected: number of rejected or interrupted attempts.
+        is_resumable: whether trials or a verdict are outstanding.
+        operator: operator of the last opening.
+        phase: phase of the session; "opening" before its first event.
+        deviations: missing or changed files of kept trials.
+        problem: why the session is not counted: a link out of it, an unreadable file,
+            or a contradiction to its name; None = no problem.
     """
 
     kept: tuple[str, ...] = ()
@@ -46,17 +45,17 @@ class SessionSummary:
 
     @property
     def is_sound(self) -> bool:
-        """Whether every file is there, can be read and is what the journal says."""
+        """Whether every file exists, is readable and agrees with the journal."""
         return self.problem is None and not self.deviations
 
 
 @dataclass(frozen=True, slots=True)
 class SeenSession:
-    """A session, and what the table shows of it.
+    """A session and its summary.
 
     Attributes:
         folder: the session.
-        summary: what the table needs of it.
+        summary: its summary.
     """
 
     folder: SessionFolder
@@ -64,24 +63,24 @@ class SeenSession:
 
     @property
     def facts(self) -> dict[str, Value]:
-        """What conditions can ask of it."""
+        """Facts of the session that conditions can test."""
         return {**facts_of(self.folder), "operator": self.summary.operator}
 
 
 class Checksums:
-    """Checksums of files, computed again only where a file has changed on the disk.
+    """Cache of checksums, computed again only for files changed on the disk.
 
-    Whoever follows the sessions looks at them every second.
+    `status --follow` asks for all of them every second.
     """
 
     def __init__(self) -> None:
-        self._known: dict[tuple[str, int, int, int, int], str] = {}
+        self._digests: dict[tuple[str, int, int, int, int], str] = {}
 
     def __call__(self, path: Path) -> str:
         """Return the SHA-256 of a file.
 
         Raises:
-            TrialFileError: it cannot be read.
+            TrialFileError: `path` cannot be read.
         """
         from experiments.session.data_files import reading, sha256_of
 
@@ -94,24 +93,24 @@ class Checksums:
             state.st_mtime_ns,
             state.st_ctime_ns,
         )
-        if key not in self._known:
-            self._known[key] = sha256_of(path)
-        return self._known[key]
+        if key not in self._digests:
+            self._digests[key] = sha256_of(path)
+        return self._digests[key]
 
 
 def glance(folder: SessionFolder) -> SessionSummary:
-    """Return a session without checksums: no trial counts as kept or as changed."""
+    """Summarise a session without checksums: no trial counts as kept or changed."""
     return summarise(folder, None)
 
 
 def summarise(
     folder: SessionFolder, digest: Callable[[Path], str] | None
 ) -> SessionSummary:
-    """Return what a session is; kept trials are held against their checksums.
+    """Summarise a session, with kept trials verified by their checksums.
 
     Args:
         folder: the session.
-        digest: computes the checksum of a file; None = no checksum is computed.
+        digest: function that computes a checksum; None = none is computed.
     """
     from experiments.session.kept_files import (
         compare_kept,
@@ -142,18 +141,18 @@ def summarise(
 
 
 def glance_sessions(data: Path) -> list[SeenSession]:
-    """Return all sessions below `data` without a look at any checksum."""
+    """Summarise all sessions below `data` without checksums."""
     return [SeenSession(folder, glance(folder)) for folder in list_sessions(data)]
 
 
 def facts_of(folder: SessionFolder) -> dict[str, Value]:
-    """Return what conditions can ask of a session that was not read."""
+    """Facts of a session that are known from its folder's name."""
     kind = "simulated" if folder.is_simulated else "live"
     return {"kind": kind, "session": folder.id}
 
 
 def recorded_factors(folder: SessionFolder) -> list[str]:
-    """Return the names of the factors that a session's conditions.json states."""
+    """Names of the factors in a session's conditions.json."""
     from experiments.session.recorded_conditions import read_conditions
 
     names = read_conditions(folder)
@@ -161,9 +160,9 @@ def recorded_factors(folder: SessionFolder) -> list[str]:
 
 
 def recorded_facts(folder: SessionFolder, where: Where) -> dict[str, Value]:
-    """Return what a session's conditions.json states of the keys that are asked for.
+    """Facts in a session's conditions.json under the keys of `where`.
 
-    The matrix may have changed since; a session without the file states nothing.
+    The matrix may have changed since; without the file there are no facts.
     """
     from experiments.session.recorded_conditions import read_conditions
 

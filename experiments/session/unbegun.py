@@ -1,4 +1,4 @@
-"""Folders of sessions that were killed before they began: they keep no number."""
+"""Removal of sessions killed before their first event, to free their numbers."""
 
 import shutil
 from pathlib import Path
@@ -8,7 +8,7 @@ from acquisition.errors import TractionError
 from experiments.session.lock import LOCK_FILE, owner_of
 from experiments.session.store import SessionFolder, list_sessions
 
-# What is written before the first line of the journal.
+# Files written before the first line of the journal.
 _BEFORE = frozenset(
     {"config.toml", "matrix.toml", "diff.patch", "preflight.json", "provenance.json"}
     | {LOCK_FILE}
@@ -17,10 +17,10 @@ _YOUNG_NS = 60 * NS_PER_S  # another process may be about to lock it
 
 
 def clear_unbegun(data: Path, utc_ns: int) -> list[str]:
-    """Remove folders in which no session ever began; return their names.
+    """Remove folders in which no session ever started; returns their names.
 
-    Such a folder has no journal, no recording, and nothing else but what is written
-    before the first event; nobody has it open, and it is a minute old.
+    Such a folder contains only files written before the first event, no process has it
+    open, and it is a minute old.
 
     Args:
         data: the data folder.
@@ -33,7 +33,7 @@ def clear_unbegun(data: Path, utc_ns: int) -> list[str]:
                 shutil.rmtree(folder.path)
                 cleared.append(folder.path.name)
         except (OSError, TractionError):
-            continue  # it stays, and so does its number
+            continue  # the folder stays
     return cleared
 
 
@@ -42,7 +42,7 @@ def _is_unbegun(folder: SessionFolder, utc_ns: int) -> bool:
     if any(path.is_symlink() for path in paths):
         return False
     files = [path for path in paths if not path.is_dir()]
-    known = {folder.path / name for name in _BEFORE}
+    expected = {folder.path / name for name in _BEFORE}
     newest_ns = max(path.stat().st_mtime_ns for path in paths)
     is_old = utc_ns - newest_ns > _YOUNG_NS
-    return is_old and known.issuperset(files) and owner_of(folder) is None
+    return is_old and expected.issuperset(files) and owner_of(folder) is None

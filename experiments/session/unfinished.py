@@ -1,4 +1,4 @@
-"""Sessions that are not finished: left on purpose, or by a process that was killed."""
+"""Unfinished sessions: closed before their end, or left by a killed process."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -22,9 +22,9 @@ class UnfinishedSession:
 
     Attributes:
         folder: the session on the disk.
-        state: what its journal says; a crash is a phase of its own here.
-        seconds: sound recording in the file of a trial that was cut short [s], with
-            what was recorded before the trigger; None without such a file.
+        state: state after its journal.
+        seconds: valid recording of an interrupted trial [s], including the time before
+            the trigger; None without such a file.
     """
 
     folder: SessionFolder
@@ -38,12 +38,12 @@ class UnfinishedSession:
 
     @property
     def running(self) -> str:
-        """Name of the trial that has no verdict; empty between trials."""
+        """Name of the trial without a verdict; empty between trials."""
         number = self.state.running
         return "" if number is None else TrialName(number, 1).kept
 
     def metadata(self) -> dict[str, object]:
-        """Return what messages say about it."""
+        """Fields of messages about the session."""
         where = "between trials"
         if self.running and self.seconds is None:
             where = f"{self.running} before its verdict"
@@ -60,15 +60,15 @@ class UnfinishedSession:
         }
 
     def text(self) -> str:
-        """Return what there is to say about it, without what to do."""
+        """Message about the session, without advice."""
         name = "crash" if self.is_crashed else "unfinished"
         return CATALOGUE[name].what.format_map(self.metadata())
 
 
 def find_unfinished(data: Path) -> list[UnfinishedSession]:
-    """Return the sessions below `data` that can be resumed and are not open now.
+    """Return the sessions below `data` that can be resumed and are not open.
 
-    Folders that cannot be read are left out: a look at old sessions stops no new one.
+    Unreadable folders are skipped: an old session never prevents a new one.
     """
     sessions: list[UnfinishedSession] = []
     with suppress(OSError):
@@ -80,23 +80,23 @@ def find_unfinished(data: Path) -> list[UnfinishedSession]:
 
 
 def is_unfinished(state: SessionState) -> bool:
-    """Return whether something is left to be recorded, or to be put away."""
+    """Return whether trials or a verdict are outstanding."""
     return state.phase in OPEN | RESUMABLE
 
 
 def inspect_session(folder: SessionFolder) -> UnfinishedSession | None:
-    """Return the session as one to be resumed, None where it is not."""
+    """Return the session if it can be resumed, else None."""
     state = replay(folder.events())
     if not is_unfinished(state) or owner_of(folder) is not None:
         return None
-    return UnfinishedSession(folder, state, _seconds(folder, state))
+    return UnfinishedSession(folder, state, _recorded_seconds(folder, state))
 
 
-def _seconds(folder: SessionFolder, state: SessionState) -> float | None:
-    """Return what there is of a trial that was cut short [s], None for nothing.
+def _recorded_seconds(folder: SessionFolder, state: SessionState) -> float | None:
+    """Duration of the recording of an interrupted trial [s], or None.
 
-    The recorder ends the file of a console that was killed: it has its final name
-    then, and the journal does not say that it was recorded.
+    The recorder completes the file of a killed console: it then has its final name,
+    while the journal lacks the event that it was recorded.
     """
     name = TrialName(state.running or 0, state.attempt(state.running or 0))
     path = folder.trials / f"{name.kept}.mcap.partial"

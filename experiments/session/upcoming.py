@@ -1,4 +1,4 @@
-"""What comes next: sessions to be resumed, and a good order of terrains."""
+"""Next steps: sessions to resume, and the suggested order of terrains."""
 
 from __future__ import annotations
 
@@ -31,21 +31,21 @@ def next_steps(
     *,
     is_simulated: bool,
 ) -> list[str]:
-    """Return what others have open, what is to be resumed, which terrain comes next.
+    """Return lines on sessions open elsewhere, sessions to resume, and next terrains.
 
     Args:
         data: the data folder.
         seen: all sessions in it.
         matrix: the terrains and their order.
-        where: of the order only terrains with these values are told; it is made of all.
-        is_simulated: of which kind of session.
+        where: conditions on the terrains shown; the order is that of all terrains.
+        is_simulated: kind of sessions.
     """
     own = [s for s in seen if s.summary.problem is None]
     own = [s for s in own if s.folder.is_simulated is is_simulated]
-    steps = [text for text in map(_opened, own) if text]
+    steps = [text for text in map(_open_elsewhere, own) if text]
     option = data_option(data)
     for session in own:
-        text = _left(session) if session.summary.is_resumable else ""
+        text = _resumable(session) if session.summary.is_resumable else ""
         if text:
             number = session.folder.id
             steps.append(f"{text} To go on: traction resume {number}{option}")
@@ -53,7 +53,7 @@ def next_steps(
     asked = {row.name for row in matrix.terrains if where.matches(facts_of_row(row))}
     order = [name for name in suggest_order(matrix, done) if name in asked]
     if order:
-        steps.append(f"{_ORDERS[matrix.design.order]}: {_listed(order)}")
+        steps.append(f"{_ORDERS[matrix.design.order]}: {_order_text(order)}")
     return steps
 
 
@@ -65,13 +65,13 @@ _ORDERS = {
 _SHOWN = 12  # terrains of an order
 
 
-def _listed(order: Sequence[str]) -> str:
+def _order_text(order: Sequence[str]) -> str:
     more = f" and {len(order) - _SHOWN} more" if order[_SHOWN:] else ""
     return " ".join(order[:_SHOWN]) + more
 
 
-def _opened(session: SeenSession) -> str:
-    """Return by which other process a session is open; empty for none."""
+def _open_elsewhere(session: SeenSession) -> str:
+    """Line on the other process that has a session open; empty if none has."""
     owner = owner_of(session.folder)
     if owner is None or owner.pid == os.getpid():
         return ""
@@ -81,8 +81,8 @@ def _opened(session: SeenSession) -> str:
     )
 
 
-def _left(session: SeenSession) -> str:
-    """Return what there is to be resumed of a session; empty for nothing."""
+def _resumable(session: SeenSession) -> str:
+    """Line on a session to resume; empty if it cannot be resumed."""
     from experiments.session.unfinished import inspect_session
 
     with suppress(OSError, TrialFileError):
@@ -92,21 +92,21 @@ def _left(session: SeenSession) -> str:
 
 
 def suggest_order(matrix: MatrixSettings, done: Sequence[str]) -> list[str]:
-    """Return the terrains still to be recorded, in the random order of the matrix.
+    """Return the terrains to record, in the random order of the matrix.
 
-    A foot that wears, a sensor that drifts and a person who learns change with time;
-    in rising order of inclines these could not be told from the incline. The seed of
-    the matrix decides the order. What is hard to change is done in one go, begun with
-    that of the last session; cells that are recorded again come when all have been
-    recorded as often.
+    Wear of the foot, drift of the sensor and learning of the operator change with time;
+    in rising order of inclines they would be confounded with the incline. The seed of
+    the matrix decides the order. Terrains that share a hard-to-change factor form a
+    block, beginning with that of the last session; a repetition starts once all cells
+    have been recorded equally often.
 
     Args:
         matrix: the matrix.
         done: names of the terrains recorded so far, oldest first.
     """
     rows = {row.name: row for row in matrix.terrains}
-    begun = [name for name in done if name in rows]
-    times, design = Counter(begun), matrix.design
+    recorded = [name for name in done if name in rows]
+    times, design = Counter(recorded), matrix.design
     least = min(times[name] for name in rows)
     if least > design.repeat_blocks:
         return []
@@ -114,14 +114,14 @@ def suggest_order(matrix: MatrixSettings, done: Sequence[str]) -> list[str]:
     if design.order != "rows":
         random.Random(design.seed + least).shuffle(order)
     if design.order == "blocked":
-        hard = {name: _hard(row, design.block_by) for name, row in rows.items()}
-        first = [hard[begun[-1]]] if begun else []
+        hard = {name: _hard_factors(row, design.block_by) for name, row in rows.items()}
+        first = [hard[recorded[-1]]] if recorded else []
         blocks = list(dict.fromkeys([*first, *(hard[name] for name in order)]))
         order.sort(key=lambda name: blocks.index(hard[name]))
     return [name for name in order if times[name] == least]
 
 
-def _hard(row: TerrainRow, block_by: Sequence[str]) -> tuple[Value, ...]:
-    """Return what is hard to change of a terrain."""
+def _hard_factors(row: TerrainRow, block_by: Sequence[str]) -> tuple[Value, ...]:
+    """Values of the hard-to-change factors of a terrain."""
     facts = facts_of_row(row)
     return tuple(facts.get(key) for key in block_by)

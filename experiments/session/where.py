@@ -24,10 +24,10 @@ _ORDERED = ("<", "<=", ">", ">=")
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """One of them.
+    """One condition of `--where`.
 
     Attributes:
-        key: what is asked for.
+        key: name of the fact.
         sign: =, !=, <, <=, > or >=.
         value: as written; "-" = does not apply.
     """
@@ -37,7 +37,7 @@ class Condition:
     value: str
 
     def holds(self, got: Value) -> bool:
-        """Return whether a value is as asked; what has no order is never below."""
+        """Return whether `got` meets the condition; words are never ordered."""
         asked, number = _number(self.value), _number(got)
         if asked is not None and number is not None:
             return _compared(number, self.sign, asked)
@@ -47,59 +47,59 @@ class Condition:
         return is_same == (self.sign == "=")
 
     def __str__(self) -> str:
-        """Return it as a person writes it."""
+        """Return the condition as typed."""
         return f"{self.key}{self.sign}{self.value}"
 
 
 @dataclass(frozen=True, slots=True)
 class Where:
-    """All conditions that have to hold.
+    """Conditions that all have to hold.
 
     Attributes:
-        conditions: none = everything is asked for.
+        conditions: the conditions; none = everything matches.
     """
 
     conditions: tuple[Condition, ...] = ()
 
     @property
     def keys(self) -> frozenset[str]:
-        """What is asked for."""
+        """Keys of the conditions."""
         return frozenset(condition.key for condition in self.conditions)
 
     def matches(self, facts: Mapping[str, Value]) -> bool:
-        """Return whether every fact that is asked for, and is known, is as asked."""
+        """Return whether every known fact meets its conditions."""
         return all(c.holds(facts[c.key]) for c in self.conditions if c.key in facts)
 
     def __bool__(self) -> bool:
-        """Whether anything is asked for."""
+        """Whether there are any conditions."""
         return bool(self.conditions)
 
     def __str__(self) -> str:
-        """Return the conditions as a person writes them."""
+        """Return the conditions as typed."""
         return ",".join(map(str, self.conditions))
 
 
 def parse_where(text: str, factors: Collection[str] = ()) -> Where:
-    """Return the conditions in `K=V,K>=V`.
+    """Parse conditions such as `K=V,K>=V`.
 
     Args:
         text: the conditions.
-        factors: keys beside `KEYS`.
+        factors: further keys.
 
     Raises:
-        SettingsError: it is not of that form, a key is unknown, or an order is asked
-            for of something that is no number.
+        SettingsError: the text is malformed, a key is unknown, or a word is compared
+            by order.
     """
     conditions: list[Condition] = []
     known = [*KEYS, *factors]
     for part in filter(None, text.split(",")):
-        found = _CONDITION.fullmatch(part.strip())
-        if found is None or found[1] not in known:
+        match = _CONDITION.fullmatch(part.strip())
+        if match is None or match[1] not in known:
             raise SettingsError(
                 f"--where {part!r} - expected KEY=VALUE, e.g. kind=live.",
                 hint=f"Keys: {', '.join(known)}. Signs: = != < <= > >=.",
             )
-        condition = Condition(found[1], found[2], found[3].strip())
+        condition = Condition(match[1], match[2], match[3].strip())
         if condition.sign in _ORDERED and _number(condition.value) is None:
             raise SettingsError(
                 f"--where {part!r}: {condition.value!r} is no number to compare with.",
@@ -110,21 +110,21 @@ def parse_where(text: str, factors: Collection[str] = ()) -> Where:
 
 
 def check_values(where: Where, known: Iterable[Mapping[str, Value]]) -> None:
-    """Refuse a condition on a value that nothing has: it would match nothing.
+    """Refuse a condition on a value that no terrain or session has.
 
     Args:
         where: the conditions.
-        known: facts of the terrains and sessions that there are.
+        known: facts of all terrains and sessions.
 
     Raises:
-        SettingsError: no fact has the value that = or != names; the known ones are
-            named.
+        SettingsError: no fact has the value after = or !=; the message lists the
+            known values.
     """
     facts = list(known)
     for condition in where.conditions:
         if condition.sign in _ORDERED:
             continue
-        values = {each[condition.key] for each in facts if condition.key in each}
+        values = {row[condition.key] for row in facts if condition.key in row}
         same = Condition(condition.key, "=", condition.value)
         if any(map(same.holds, values)):
             continue

@@ -1,5 +1,5 @@
 """rig.toml, matrix.toml and calibration files: read, checked, explained.
 
-`load` returns `Settings` or names every error, `rig` and `matrix` say what may stand in
-the files, `origins` where a value came from. Begin with `load`.
+`load` returns `Settings` or reports every error, `rig` and `matrix` define the files,
+`origins` finds the source of a value. Begin with `load`.
 """

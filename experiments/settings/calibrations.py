@@ -1,4 +1,4 @@
-"""The settings with the calibrations that they name: sensor, feet, containers."""
+"""Apply the calibrations that settings name: sensor, feet, containers."""
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
@@ -20,20 +20,20 @@ from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_from_tom
 from ft_sensor.payload import TerrainFrame
 
 NOTHING = "Nothing was started."
-PREFIX = "calibration:"  # before the name of a file among the texts
-FORCED = "forced"  # fact of a container that a person accepted
+PREFIX = "calibration:"  # prefix of file names among the texts
+FORCED = "forced"  # key of a container calibration that was forced
 
 
 def read_calibration(path: Path, what: str, instead: str) -> str:
     """Return the text of the calibration at `path`.
 
     Args:
-        path: of the file.
-        what: what is calibrated, as in "traction calibrate WHAT".
-        instead: what to write into the settings to do without.
+        path: path of the file.
+        what: calibrated quantity, as in "traction calibrate WHAT".
+        instead: advice how to do without it.
 
     Raises:
-        SettingsError: it cannot be read.
+        SettingsError: the file cannot be read.
     """
     try:
         return read_text(path)
@@ -48,16 +48,16 @@ def read_calibration(path: Path, what: str, instead: str) -> str:
 def check_kind(
     name: str, *, is_of_simulation: bool, is_simulated: bool, instead: str
 ) -> None:
-    """Refuse what was measured on a simulated rig for a real one, and conversely.
+    """Refuse a calibration of a simulated rig for a real one, and vice versa.
 
     Args:
-        name: of the file.
-        is_of_simulation: it was measured on a simulated rig.
-        is_simulated: the rig of now.
-        instead: what to write into the settings to do without.
+        name: name of the file.
+        is_of_simulation: whether it was measured on a simulated rig.
+        is_simulated: whether the present rig is simulated.
+        instead: advice how to do without it.
 
     Raises:
-        SettingsError: the two do not fit.
+        SettingsError: the kinds differ.
     """
     if is_of_simulation == is_simulated:
         return
@@ -70,7 +70,7 @@ def check_kind(
 
 
 def fault_of(check: Callable[[], None]) -> str:
-    """Return what a check says of a calibration, "" where it has nothing to say."""
+    """Return the message of a failed check, "" if it passes."""
     try:
         check()
     except SettingsError as error:
@@ -79,7 +79,7 @@ def fault_of(check: Callable[[], None]) -> str:
 
 
 def unfit(name: str, fault: str, what: str, instead: str) -> SettingsError:
-    """Return the refusal of a calibration that its command would not have written."""
+    """Return the error for a calibration that its command would have refused."""
     return SettingsError(
         f"{name} is no calibration to use. {fault}",
         hint=f"Run traction calibrate {what} again, or {instead}. {NOTHING}",
@@ -91,15 +91,15 @@ _INSTEAD = "remove the line calibration = {name!r}"
 
 
 def with_calibrations(settings: Settings, *, is_simulated: bool) -> Settings:
-    """Return the settings with what their calibrations measured in its place.
+    """Return the settings with the values of their calibrations.
 
-    A sensor's calibration gives the mounting, and mass and centre of the foot that was
-    on; a foot's own goes before. A container's gives the frame of its row. A simulated
-    world is made from the settings without them: it does not know what was measured.
+    A sensor calibration sets the mounting, and mass and centre of the mounted foot; a
+    foot's own calibration takes precedence. A container calibration sets the frame of
+    its row. A simulation is built from the settings without calibrations.
 
     Raises:
-        SettingsError: a file cannot be read, is not a calibration, of another foot or
-            terrain, or of a simulated rig for a real one, or conversely.
+        SettingsError: a file cannot be read, is no calibration, is of another foot or
+            terrain, or of a simulated rig for a real one or vice versa.
     """
     reader = _Reader(settings, is_simulated=is_simulated)
     rig = reader.rig(settings.rig)
@@ -139,11 +139,11 @@ class _Reader:
         return _checked(RigSettings, values)
 
     def row(self, row: TerrainRow, sharing: Collection[str]) -> TerrainRow:
-        """Return a row of the matrix with the container where it was touched.
+        """Return a row of the matrix with the calibrated frame of its container.
 
         Args:
             row: the row.
-            sharing: names of the terrains that stand at its place, itself among them.
+            sharing: names of the terrains at its place, including its own.
         """
         if row.taught is not None:
             instead = f"remove [places.{row.place}]"

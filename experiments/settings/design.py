@@ -1,8 +1,8 @@
-"""matrix.toml: factors, defaults, cells and crosses, made into rows.
+"""matrix.toml: factors, defaults, cells and crosses, resolved into rows.
 
-A cell states every factor, or "-" where one does not apply; a cross stands for every
-combination of its lists. Where a cell stands follows from a place of rig.toml, or from
-its own far_end.
+A cell states every factor, or "-" if one does not apply; a cross stands for every
+combination of its lists. The location of a cell is a place of rig.toml, or its own
+far_end.
 """
 
 import itertools
@@ -43,7 +43,7 @@ from experiments.settings.places import StatedPlace
 
 ABSENT = "-"  # a factor that does not apply
 MOST_CELLS = 400
-_SAME_INCLINE = 3.0  # degrees between a cell and the place that was taught
+_SAME_INCLINE = 3.0  # degrees, tolerance between a cell and its taught place
 _NOTHING = "Nothing was started."
 _FIELD = re.compile(r"\{([a-z][a-z0-9_]*)(?::([^{}]*))?\}")
 _FORM = re.compile(r"[+-]?0?\d{0,2}(?:\.\d{1,2})?[dfgs]?")
@@ -56,7 +56,7 @@ _RESERVED = frozenset(
 )
 
 
-# of fakes.ground, which a real rig does not have
+# parameters of fakes.ground, for simulated rigs only
 _Parameter = Literal[
     "J0",
     "k_J",
@@ -79,7 +79,7 @@ _Effects = dict[str, dict[str, dict[_Parameter, _Multiple]]]
 
 
 class _Cell(SettingsSection):
-    """What a cell may state beside its factors; what is left out has a default."""
+    """Keys of a cell other than its factors, with their defaults."""
 
     name: CellName = Field(examples=["G37W-10"])
     foot: FootName = Field(examples=["tread"])
@@ -103,7 +103,7 @@ _VARIED = frozenset(
 
 
 class DesignFile(SettingsSection):
-    """A matrix.toml, cells and crosses not looked into yet."""
+    """Content of matrix.toml, cells and crosses not validated yet."""
 
     factors: tuple[DesignFactor, ...] = Field(default=(), max_length=MOST_FACTORS)
     design: Design = Design()
@@ -115,12 +115,12 @@ class DesignFile(SettingsSection):
 
 @dataclass(frozen=True, slots=True)
 class _Stated:
-    """One cell as stated: its values, and the table that it stands in.
+    """One cell as stated, with its table.
 
     Attributes:
-        values: of all keys, defaults included.
-        table: its name in the file, e.g. "cells[3]".
-        is_of_cross: one of the combinations of a cross.
+        values: values of all keys, including defaults.
+        table: name of its table in the file, e.g. "cells[3]".
+        is_of_cross: whether it is a combination of a cross.
     """
 
     values: Mapping[str, Any]
@@ -131,23 +131,23 @@ class _Stated:
 def resolve_design(
     file: DesignFile, text: str, places: Mapping[str, StatedPlace], feet: Sequence[str]
 ) -> MatrixSettings:
-    """Return the rows that a file stands for.
+    """Resolve a file into rows.
 
     Args:
         file: the file.
-        text: its text, for the lines in messages.
-        places: of rig.toml, by name.
+        text: its text, for line numbers in messages.
+        places: places of rig.toml, by name.
         feet: names of the feet of rig.toml.
 
     Raises:
-        SettingsError: a key or value is wrong, missing or twice, or there are too many
-            cells.
+        SettingsError: a key or value is wrong, missing or duplicate, or there are too
+            many cells.
     """
     return _Resolver(file, text, places, feet).matrix()
 
 
 class _Resolver:
-    """Makes rows of what a file states, or says where it is wrong."""
+    """Resolves a file into rows, or reports the line of its first error."""
 
     def __init__(
         self,
@@ -220,7 +220,9 @@ class _Resolver:
                 for key, value in values.items()
                 if isinstance(value, list) and (key in self._factors or key in _VARIED)
             }
-            if empty := next((key for key, each in lists.items() if not each), None):
+            if empty := next(
+                (key for key, levels in lists.items() if not levels), None
+            ):
                 raise self._error(f"{table}.{empty}", f"{empty} is an empty list")
             count += math.prod(map(len, lists.values()))
             if count > MOST_CELLS:
@@ -236,7 +238,7 @@ class _Resolver:
         if not isinstance(template, str) or len(template) > 200:
             raise self._error(table, 'name is missing, e.g. name = "G{d50:g}{foot:.1}"')
 
-        def one(match: re.Match[str]) -> str:
+        def format_field(match: re.Match[str]) -> str:
             key, form = match[1], match[2] or ""
             if key not in values or not isinstance(values[key], str | int | float):
                 raise self._error(table, f"name has {{{key}}}, which it does not state")
@@ -252,7 +254,9 @@ class _Resolver:
                     table, f"name cannot write {key} = {value!r} as {form!r}"
                 ) from error
 
-        texts = {match.start(): one(match) for match in _FIELD.finditer(template)}
+        texts = {
+            match.start(): format_field(match) for match in _FIELD.finditer(template)
+        }
         ends = {
             match.end(): texts[match.start()] for match in _FIELD.finditer(template)
         }
@@ -263,18 +267,18 @@ class _Resolver:
                     f"name {template!r} joins two numbers without a mark between, so "
                     "that 1 and 11 look like 11 and 1",
                 )
-        name = _FIELD.sub(one, template)
+        name = _FIELD.sub(format_field, template)
         if "{" in name or "}" in name:
             raise self._error(table, f"name {template!r} has an odd brace")
         return name
 
     def _row(self, stated: _Stated) -> TerrainRow:
         table = stated.table
-        strange = [
+        unknown = [
             k for k in stated.values if k not in _KEYS and k not in self._factors
         ]
-        if strange:
-            key = strange[0]
+        if unknown:
+            key = unknown[0]
             meant = nearest(key, [*_KEYS, *self._factors])
             asked = f" - did you mean {meant}?" if meant else ""
             raise self._error(
@@ -316,7 +320,7 @@ class _Resolver:
         return values
 
     def _placed(self, cell: _Cell, factors: dict[str, Value], table: str) -> TerrainRow:
-        """Return a cell where its place, or its own far_end, puts it."""
+        """Return the row of a cell, located by its place or its own far_end."""
         if cell.foot not in self._feet:
             raise self._error(
                 f"{table}.foot",
@@ -353,7 +357,7 @@ class _Resolver:
         )
 
     def _effects(self, factors: Mapping[str, Value]) -> dict[str, float]:
-        """Return what the words of a cell multiply the simulated ground by."""
+        """Return the factors by which a cell scales the simulated ground."""
         multiples: dict[str, float] = {}
         for name, by_word in self._file.simulate.items():
             for parameter, multiple in by_word.get(str(factors.get(name)), {}).items():
@@ -363,29 +367,29 @@ class _Resolver:
     def _place(self, cell: _Cell, table: str) -> StatedPlace:
         place = self._places.get(cell.place or "")
         if place is None:
-            known = ", ".join(self._places) or "none"
+            names = ", ".join(self._places) or "none"
             raise self._error(
                 f"{table}.place",
                 f"{cell.name}: place = {cell.place!r} is not in rig.toml, which has: "
-                f"{known}. Teach it: traction teach {cell.place}",
+                f"{names}. Teach it: traction teach {cell.place}",
             )
         return place
 
     def _incline(self, cell: _Cell, place: StatedPlace, table: str) -> float:
-        """Return the incline of a cell; a place that differs is another one."""
+        """Return the incline of a cell; refuses one that differs from its place."""
         if cell.incline_deg is None:
             return _first(place.incline_deg, None, 0.0)
-        known = place.incline_deg
-        if known is not None and abs(known - cell.incline_deg) > _SAME_INCLINE:
+        taught = place.incline_deg
+        if taught is not None and abs(taught - cell.incline_deg) > _SAME_INCLINE:
             raise self._error(
                 table,
                 f"{cell.name}: incline_deg = {cell.incline_deg:g}, but place "
-                f"{cell.place} stands at {known:g} degrees",
+                f"{cell.place} stands at {taught:g} degrees",
             )
         return cell.incline_deg
 
     def _stones(self, cell: _Cell, factors: Mapping[str, Value], table: str) -> str:
-        """Return the size of the stones in the word of recordings."""
+        """Return the size of the stones as recordings state it."""
         d50 = factors.get("d50")
         size = None if isinstance(d50, str) else d50
         if cell.ground is not None:
@@ -405,5 +409,5 @@ class _Resolver:
 
 
 def _first(own: float | None, other: float | None, default: float) -> float:
-    """Return the first number that is stated."""
-    return next((each for each in (own, other) if each is not None), default)
+    """Return the first stated number, or the default."""
+    return next((value for value in (own, other) if value is not None), default)

@@ -1,4 +1,4 @@
-"""What is wrong in a settings file, line by line, and what was probably meant."""
+"""Explain the errors of a settings file, with lines and probable intentions."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -18,10 +18,10 @@ _KEY = re.compile(r"""^\s*["']?([\w-]+)["']?\s*[=.]""")
 
 
 def line_of(text: str, name: str) -> int | None:
-    """Return the number of the line of a TOML text where a setting stands.
+    """Return the line number of a setting in a TOML text.
 
-    That is the line of its key, or of the table that should have it; None where neither
-    stands at the beginning of a line.
+    The line of its key, or of the table that should have it; None if neither is at the
+    beginning of a line.
 
     Args:
         text: the TOML.
@@ -51,25 +51,24 @@ def explain(
     error: ValidationError,
     inside: str = "",
 ) -> str:
-    """Return what is wrong with a file that should have been a `model`.
+    """Describe the errors of a file that should be a `model`.
 
-    All errors are named, each with its line. A misspelt key is one error, not an
+    All errors are reported, each with its line. A misspelt key is one error, not an
     unknown key and a missing one.
 
     Args:
-        model: what the file should be.
-        name: of the file.
+        model: model of the file.
+        name: name of the file.
         text: its content.
-        error: what pydantic says of it.
-        inside: the table of the file that should be one, e.g. "cells[3]"; empty = the
-            whole file.
+        error: error of pydantic.
+        inside: table that should be the model, e.g. "cells[3]"; empty = the whole file.
     """
     errors = sorted(error.errors(), key=lambda e: e["type"] == "missing")
     parts: list[str] = []
     meant: set[tuple[int | str, ...]] = set()
-    for each in errors:
-        where = each["loc"]
-        if each["type"] == "extra_forbidden":
+    for detail in errors:
+        where = detail["loc"]
+        if detail["type"] == "extra_forbidden":
             missing = {
                 str(e["loc"][-1]): e["loc"]
                 for e in errors
@@ -79,7 +78,7 @@ def explain(
             if key is not None:
                 meant.add(missing[key])
         if where not in meant:
-            parts.append(_sentence(model, text, each, inside))
+            parts.append(_sentence(model, text, detail, inside))
     more = [f"and {len(parts) - _MOST} more"] if parts[_MOST:] else []
     return f"{name}: {'; '.join([*parts[:_MOST], *more])}."
 
@@ -87,7 +86,7 @@ def explain(
 def _sentence(
     model: type[BaseModel], text: str, error: ErrorDetails, inside: str
 ) -> str:
-    """Return one error without its full stop, its line at the end."""
+    """Describe one error, without full stop, with its line at the end."""
     location = _locate(model, error["loc"], inside)
     line = line_of(text, location.name)
     return _reason(location, error) + (f" (line {line})" if line else "")
@@ -126,12 +125,12 @@ class _Location:
     """A setting in a settings file.
 
     Attributes:
-        name: its dotted name as a person writes it.
-        field: what should stand there; None where nothing is known.
-        kinds: the sections that a `kind` chooses between, on the way to it; or none.
-        kind: the chosen one.
-        siblings: the keys that may stand beside it.
-        item: which one of the field's numbers; None = the field is no list.
+        name: dotted name.
+        field: the field; None if unknown.
+        kinds: sections that a `kind` above it selects from; or none.
+        kind: the selected kind.
+        siblings: permitted keys of its table.
+        item: index in the field's list; None = no list.
     """
 
     name: str
@@ -143,7 +142,7 @@ class _Location:
 
     @property
     def example(self) -> str:
-        """An example of the field for the end of a sentence; or nothing."""
+        """An example of the field to end a sentence; or nothing."""
         examples = self.field.examples if self.field else None
         return f", e.g. {examples[0]}" if examples else ""
 
@@ -151,14 +150,14 @@ class _Location:
 def _locate(
     model: type[BaseModel], location: tuple[int | str, ...], inside: str
 ) -> _Location:
-    """Follow the `location` of an error; a kind stands in it like a table."""
+    """Resolve the `location` of an error, in which a kind appears like a table."""
     current: type[BaseModel] | None = model
     field: FieldInfo | None = None
     kinds: Mapping[str, type[BaseModel]] = {}
     name, kind = inside, ""
     siblings: Sequence[str] = ()
     item: int | None = None
-    is_named = False  # of several tables, each under a name of its own
+    is_named = False  # next part is the name of one of several tables
     for part in location:
         if is_named and isinstance(part, str):
             name, is_named = f"{name}.{part}", False
@@ -199,7 +198,7 @@ def _kinds(kinds: Mapping[str, type[BaseModel]]) -> str:
 
 
 def _refusal(location: _Location, option: str) -> str:
-    """Return why there is no such `option`; that of another kind has a name."""
+    """Explain an unknown `option`; names the kinds that have it."""
     others = [kind for kind, s in location.kinds.items() if option in s.model_fields]
     if not others:
         return "is not a setting Traction knows"

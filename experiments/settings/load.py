@@ -1,4 +1,4 @@
-"""rig.toml and matrix.toml: read, checked, with an error that says what to write."""
+"""Read and check rig.toml and matrix.toml, with errors that give advice."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -26,7 +26,7 @@ SHIPPED = "shipped default"
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """The resolved settings and where they came from.
+    """The resolved settings and their origin.
 
     Attributes:
         rig: rig.toml.
@@ -34,7 +34,7 @@ class Settings:
         rig_text: text of rig.toml, for the recording.
         matrix_text: text of matrix.toml.
         origin: "shipped default" or the folder of the files.
-        folder: where the files are that rig.toml names.
+        folder: folder of the files named in rig.toml.
         calibrations: texts of the calibration files that were applied, by name.
     """
 
@@ -52,7 +52,7 @@ class Settings:
         return "rig.toml" if self.origin == SHIPPED else Path(self.origin).name
 
     def unusual(self) -> list[str]:
-        """Return a sentence for each number that no sound rig has."""
+        """Return a sentence for each unusual number."""
         files = ((self.rig_name, self.rig), ("matrix.toml", self.matrix))
         return [
             f"{file}: {words}"
@@ -61,10 +61,10 @@ class Settings:
         ]
 
     def check_real(self) -> None:
-        """Refuse what only a simulated rig may have.
+        """Refuse numbers that only a simulated rig may have.
 
         Raises:
-            SettingsError: a number is beyond what a real arm may have.
+            SettingsError: a number exceeds the limit of a real arm.
         """
         beyond = beyond_real(self.rig)
         if beyond:
@@ -75,17 +75,17 @@ class Settings:
             )
 
     def by_cad(self) -> "Settings":
-        """Return the same with the gravity of the drawings, for a calibration."""
+        """Return the settings with the gravity of the drawings, for a calibration."""
         cad = self.rig.gravity.model_copy(update={"model": "cad"})
         return replace(self, rig=self.rig.model_copy(update={"gravity": cad}))
 
     def without_friction(self) -> "Settings":
-        """Return the same without compensation of friction, for a calibration."""
+        """Return the settings without friction compensation, for a calibration."""
         none = self.rig.friction.model_copy(update={"model": "none"})
         return replace(self, rig=self.rig.model_copy(update={"friction": none}))
 
     def with_foot_mass(self, mass: float) -> "Settings":
-        """Return the same as if the feet had `mass` [kg] in rig.toml.
+        """Return the settings with `mass` [kg] for all feet.
 
         Raises:
             SettingsError: rig.toml would be refused.
@@ -97,15 +97,15 @@ class Settings:
         return replace(self, rig=rig)
 
     def with_row(self, row: TerrainRow) -> "Settings":
-        """Return the same with `row` in place of the one of its name."""
+        """Return the settings with `row` replacing the row of that name."""
         rows = tuple(row if old.name == row.name else old for old in self._rows)
         matrix = self.matrix.model_copy(update={"terrains": rows})
         return replace(self, matrix=matrix)
 
     def without_sensor(self, foot: str, *, is_mounted: bool) -> "Settings":
-        """Return the same without what was measured of `foot`, for a calibration.
+        """Return the settings without the calibration of `foot`, for a new one.
 
-        The mounting of the sensor goes too, unless it `is_mounted` as it was.
+        The mounting of the sensor is reset too, unless it `is_mounted` as before.
         """
         nothing = {"calibration": None}
         old = self.rig.feet[foot]
@@ -137,21 +137,21 @@ class Settings:
 
 
 def load_settings(config: Path | None) -> Settings:
-    """Return settings from `config`, a rig.toml with a matrix.toml beside it.
+    """Load settings from `config`, a rig.toml, and the matrix.toml in its folder.
 
-    Without `config` the shipped defaults are used; a missing matrix.toml too.
+    Without `config`, or without matrix.toml, the shipped defaults are used.
 
     Raises:
-        SettingsError: a file is missing, no TOML, or holds a wrong key or value.
+        SettingsError: a file is missing, is no TOML, or has a wrong key or value.
     """
     rig_text, matrix_text = map(_shipped, ("rig.toml", "matrix.toml"))
     origin = SHIPPED
     if config is not None:
         rig_text = _read(config)
         origin = str(config)
-        beside = config.with_name("matrix.toml")
-        if beside.exists():
-            matrix_text = _read(beside)
+        matrix_path = config.with_name("matrix.toml")
+        if matrix_path.exists():
+            matrix_text = _read(matrix_path)
     name = "rig.toml" if config is None else config.name
     folder = config.parent if config is not None else Path()
     rig = load_rig(rig_text, name, folder)
@@ -162,15 +162,15 @@ def load_settings(config: Path | None) -> Settings:
 def load_unplaced(
     config: Path | None, place: str, foot: str | None
 ) -> tuple[Settings, TerrainRow]:
-    """Return settings with one terrain at a place that nobody has measured yet.
+    """Load settings with one terrain at a place that is not taught yet.
 
-    Where the container of a simulation stands follows from the numbers that rig.toml
-    has of the place, or is that of the shipped matrix; a real arm needs none.
+    A simulation takes the location of the container from rig.toml, or from the shipped
+    matrix; a real arm needs none.
 
     Args:
         config: rig.toml; None = the shipped defaults. No matrix.toml is read.
-        place: its name.
-        foot: that is mounted; None = the first of rig.toml.
+        place: name of the place.
+        foot: the mounted foot; None = the first of rig.toml.
 
     Raises:
         SettingsError: rig.toml has a wrong key or value, or no such foot.
@@ -185,14 +185,14 @@ def load_unplaced(
             f"There is no foot {foot!r} in {name}.",
             hint=f"Feet: {', '.join(rig.feet)}. Nothing was started.",
         )
-    known = rig.places.get(place, StatedPlace())
+    stated = rig.places.get(place, StatedPlace())
     row = TerrainRow(
         name=f"place-{place.replace('_', '-')}"[:24],
         foot=foot or next(iter(rig.feet)),
-        far_end=known.far_end or (0.70, 0.0, 0.12),
-        heading_deg=known.heading_deg or 0.0,
-        incline_deg=known.incline_deg or 0.0,
-        travel=known.travel or 0.45,
+        far_end=stated.far_end or (0.70, 0.0, 0.12),
+        heading_deg=stated.heading_deg or 0.0,
+        incline_deg=stated.incline_deg or 0.0,
+        travel=stated.travel or 0.45,
         trials=1,
         stones="small",
     )
@@ -203,19 +203,19 @@ def load_unplaced(
 
 
 def load_rig(text: str, name: str, folder: Path) -> RigSettings:
-    """Return a rig.toml with the places that were taught.
+    """Parse a rig.toml, with its taught places.
 
     Args:
         text: its text.
-        name: of the file, in messages.
-        folder: where the files are that it names.
+        name: name of the file, for messages.
+        folder: folder of the files that it names.
 
     Raises:
         SettingsError: no TOML, or it or a taught place has a wrong key or value.
     """
     rig = _rig_of(text, name)
     build_device(rig.ft_sensor)
-    places = {key: _taught(key, each, folder) for key, each in rig.places.items()}
+    places = {key: _taught(key, place, folder) for key, place in rig.places.items()}
     return rig.model_copy(update={"places": places})
 
 
@@ -224,10 +224,10 @@ def _rig_of(text: str, name: str) -> RigSettings:
 
 
 def _read_table(text: str, name: str) -> dict[str, Any]:
-    """Return what a settings file states beside its version.
+    """Return the content of a settings file without its version.
 
     Raises:
-        SettingsError: no TOML, or of another version.
+        SettingsError: no TOML, or another version.
     """
     table = _toml(text, name)
     if problem := format_problem(table.get("version")):
@@ -239,7 +239,7 @@ def _read_table(text: str, name: str) -> dict[str, Any]:
 
 
 def _taught(name: str, place: StatedPlace, folder: Path) -> StatedPlace:
-    """Return a place with what its file states."""
+    """Return a place with the values of its file."""
     if place.taught is None:
         return place
     if place.has_numbers:
@@ -265,21 +265,21 @@ def _taught(name: str, place: StatedPlace, folder: Path) -> StatedPlace:
 
 
 def load_matrix(text: str, rig: RigSettings) -> MatrixSettings:
-    """Return the rows of a matrix.toml.
+    """Parse a matrix.toml.
 
     Raises:
-        SettingsError: no TOML, of another version, or a wrong key or value, or one that
-            the rig has not.
+        SettingsError: no TOML, another version, or a wrong key or value, or a place or
+            foot that rig.toml lacks.
     """
     file = _validated(DesignFile, _read_table(text, "matrix.toml"), text, "matrix.toml")
     return resolve_design(file, text, rig.places, tuple(rig.feet))
 
 
 def read_foot(path: Path) -> FootSection:
-    """Return the foot that a TOML file of its own describes: mass, com, inertia, sole.
+    """Read a foot from a TOML file: mass, com, inertia, sole.
 
     Raises:
-        SettingsError: it cannot be read, or holds a wrong key or value.
+        SettingsError: the file cannot be read, or has a wrong key or value.
     """
     text = _read(path, "Name a foot of rig.toml, or a file with mass, com, inertia.")
     return _parse(FootSection, text, path.name)
@@ -311,7 +311,7 @@ def _toml(text: str, name: str) -> dict[str, Any]:
 
 
 def _validated(model: type[_M], data: object, text: str, name: str) -> _M:
-    """Return the `data` of a file `name` with `text` as a `model`."""
+    """Validate the `data` of the file `name` with content `text` as a `model`."""
     try:
         return model.model_validate(data)
     except ValidationError as error:

@@ -1,6 +1,6 @@
-"""The matrix: what stands in matrix.toml once it is read, a row per terrain.
+"""The matrix: content of matrix.toml, one row per terrain.
 
-The file names factors, cells and crosses; `design` makes the rows.
+The file defines factors, cells and crosses; `design` resolves them into rows.
 """
 
 import math
@@ -15,7 +15,7 @@ MOST_FACTORS = 12
 LONGEST_WORD = 40
 _Across = Annotated[Number, Field(ge=-1.2, le=1.2), UsualRange(-1.0, 1.0, "m")]
 _Up = Annotated[Number, Field(ge=-0.5, le=1.0), UsualRange(-0.4, 0.6, "m")]
-FarEnd = tuple[_Across, _Across, _Up]  # what the arm reaches
+FarEnd = tuple[_Across, _Across, _Up]  # within reach of the arm
 # The stops of the joints, as in wam7.toml.
 Angles = tuple[
     Annotated[Number, Field(ge=-2.6, le=2.6), UsualRange(-2.5, 2.5, "rad")],
@@ -34,7 +34,7 @@ Incline = Annotated[Number, Field(ge=-30, le=30), UsualRange(-20.0, 20.0, "degre
 Trials = Annotated[Whole, Field(ge=1, le=99), UsualRange(1, 30)]
 PlaceName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,23}$")]
 FootName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,15}$")]
-CellName = Annotated[  # a point stands before a digit only
+CellName = Annotated[  # a point only before a digit
     str,
     Field(max_length=24, pattern=r"^[A-Za-z0-9](?:[A-Za-z0-9+-]|\.[0-9])*$"),
 ]
@@ -52,15 +52,15 @@ Word = Annotated[
 
 
 class DesignFactor(SettingsSection):
-    """Something that varies between the cells.
+    """A factor of the experimental design.
 
     Attributes:
-        name: the key of the cells that states it.
-        unit: of a number; "" = none.
+        name: key in the cells.
+        unit: unit of a number; "" = none.
         kind: a number, or one of `levels`.
-        scale: on which numbers are compared.
-        levels: the words that a cell may state.
-        words: what a word means, for people.
+        scale: scale on which numbers are compared.
+        levels: permitted words.
+        words: meanings of the words, for people.
     """
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,23}$")] = Field(
@@ -83,14 +83,14 @@ class DesignFactor(SettingsSection):
                 raise ValueError("a word has no unit and no scale")
         elif self.levels or self.words:
             raise ValueError("a number has no levels and no words")
-        if strange := sorted(set(self.words) - set(self.levels)):
-            raise ValueError(f"words explains {strange[0]!r}, which is no level")
+        if unknown := sorted(set(self.words) - set(self.levels)):
+            raise ValueError(f"words explains {unknown[0]!r}, which is no level")
         if self.name == "d50" and (self.kind, self.unit) != ("number", "mm"):
             raise ValueError('d50 is the grain size: kind = "number", unit = "mm"')
         return self
 
     def check(self, value: Value) -> str:
-        """Return what is wrong with a value of this factor, "" for nothing."""
+        """Return the expected values if `value` is invalid, else ""."""
         if value is None:
             return ""
         if self.kind == "word":
@@ -105,14 +105,15 @@ class DesignFactor(SettingsSection):
 
 
 class Design(SettingsSection):
-    """In which order the cells are recorded.
+    """Order of the recordings.
 
     Attributes:
-        order: by chance against drift, as the rows stand, or by chance within blocks.
-        block_by: keys of the cells that are hard to change: those alike are done in
-            one go.
-        repeat_blocks: how often all cells are recorded again, on another day.
-        seed: of the random order.
+        order: randomised against drift, in the order of the rows, or randomised in
+            blocks.
+        block_by: hard-to-change keys of the cells; cells with equal values form a
+            block.
+        repeat_blocks: number of repetitions of all cells, on other days.
+        seed: seed of the random order.
     """
 
     order: Literal["randomised", "rows", "blocked"] = "randomised"
@@ -124,27 +125,28 @@ class Design(SettingsSection):
 
 
 class TerrainRow(SettingsSection):
-    """One row of the matrix: a terrain, the foot, the way across, the factors.
+    """One row of the matrix: terrain, foot, push and factors.
 
     Attributes:
-        name: of the terrain.
-        foot: of rig.toml.
-        far_end: where the foot starts, in the base frame [m].
+        name: name of the terrain.
+        foot: a foot of rig.toml.
+        far_end: start of the foot, in the base frame [m].
         heading_deg: direction from the base to the container [degrees].
         travel: length of a push [m].
-        trials: how many are to be kept.
-        reset: what a person does to the terrain before every trial.
-        calibration: file of the container as calibrated; None = it was not.
+        trials: number of trials to keep.
+        reset: steps that restore the terrain before every trial.
+        calibration: file of the container's calibration; None = not calibrated.
         stones: size of the stones as recordings state it: small, big, none, e.g.
             "12 mm", "fine", or "stones" of unknown size.
-        incline_deg: of the container, positive where its far end is high [degrees].
+        incline_deg: incline of the container, positive if its far end is high
+            [degrees].
         push_deg: direction of the push against x_T [degrees]: 0 = toward the base, 180
             = away from it, from the near end.
         start_q: joints with the foot at the far end [rad]; None = computed.
-        place: of rig.toml, where the container stands; None = its own.
-        taught: file of `place` as taught by hand; None = it was not.
+        place: place of the container in rig.toml; None = its own.
+        taught: file of the taught `place`; None = not taught.
         factors: values by name of the factor; None = does not apply.
-        simulate: by parameter of the simulated ground, what its words multiply it by.
+        simulate: multipliers of the simulated ground, by parameter.
     """
 
     name: CellName
@@ -172,14 +174,14 @@ class TerrainRow(SettingsSection):
         return terrain_kind(self.name, [self.stones])
 
     def as_container(self) -> "TerrainRow":
-        """Return it as its container stands, whichever way it is crossed."""
+        """Return the row with the frame of its container, for either push direction."""
         return self if self.push_deg == 0 else self.model_copy(update={"push_deg": 0})
 
     def plain(self) -> dict[str, Any]:
-        """Return it in plain values, without what only few rows state."""
+        """Return plain values, without unset optional fields."""
         values = self.model_dump(mode="json")
-        few = ("push_deg", "place", "taught", "factors", "simulate")
-        return {k: v for k, v in values.items() if k not in few or v}
+        optional = ("push_deg", "place", "taught", "factors", "simulate")
+        return {k: v for k, v in values.items() if k not in optional or v}
 
 
 class MatrixSettings(SettingsSection):

@@ -1,7 +1,7 @@
-"""Numbers of settings: their bounds in words, what was meant, what a sound rig has not.
+"""Numbers of settings: bounds as text, probable intentions, unusual values.
 
-Bounds, unit and usual values stand beside each number in its section and are read here:
-beyond its bounds a number is refused, beyond what is usual it is warned of.
+Bounds, unit and usual values are declared with each number in its section: a number
+out of bounds is refused, an unusual one causes a warning.
 """
 
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ from acquisition.settings import UsualRange
 _NUMBERS: dict[object, str] = {int: "a whole number", float: "a number"}
 _BOUNDS = (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<="))
 _DEGREE = 0.017453292519943295  # rad
-# By unit: others that numbers are found in, in this unit.
+# By unit: units that numbers are typed in by mistake, with their factors.
 _OTHERS: dict[str, tuple[tuple[str, float], ...]] = {
     "rad": (("degrees", _DEGREE),),
     "rad/s": (("degrees/s", _DEGREE),),
@@ -34,18 +34,18 @@ _DECIMAL_POINT = (0.1, 0.01, 0.001, 10.0, 100.0)
 
 
 def number_at(field: FieldInfo | None, item: int | None) -> FieldInfo | None:
-    """Return what stands in a `field`, or at an `item` of it, if that is a number."""
+    """Return the number of a `field`, or of an `item` of it, or None."""
     while field is not None and field.annotation not in _NUMBERS:
         kinds = [kind for kind in get_args(field.annotation) if kind is not type(None)]
         if item is not None and len(kinds) > 1:
             kinds, item = kinds[item : item + 1], None
-        # An optional number is a union with none; a list of any length has one kind.
+        # An optional number is a union with None; a list of any length has one kind.
         field = FieldInfo.from_annotation(kinds[0]) if len(kinds) == 1 else None
     return field
 
 
 def number_words(number: FieldInfo, got: object) -> tuple[str, str]:
-    """Return what a number should be, with bounds and unit; and what may be meant."""
+    """Return the expected number as text, with bounds and unit; the likely mistake."""
     usual = _usual(number)
     unit = usual.unit if usual else ""
     bounds = [
@@ -60,12 +60,12 @@ def number_words(number: FieldInfo, got: object) -> tuple[str, str]:
 
 def _usual(number: FieldInfo) -> UsualRange | None:
     return next(
-        (each for each in number.metadata if isinstance(each, UsualRange)), None
+        (entry for entry in number.metadata if isinstance(entry, UsualRange)), None
     )
 
 
 def _meant(number: FieldInfo, got: object) -> str:
-    """Return the likely mistake behind a number as a question; "" = none is likely."""
+    """Return the likely mistake behind a number as a question; "" = none."""
     if not isinstance(got, int | float) or isinstance(got, bool):
         return ""
     usual, value = _usual(number), float(got)
@@ -86,7 +86,7 @@ def _meant(number: FieldInfo, got: object) -> str:
 
 
 def unusual_numbers(section: BaseModel) -> Iterator[str]:
-    """Yield a sentence for each number within its bounds that no sound rig has."""
+    """Yield a sentence for each unusual number."""
     for place, number, usual, value in _usual_numbers(section, ""):
         if not usual.low <= value <= usual.high:
             band = f"{usual.low:g} to {usual.high:g} {usual.unit}".rstrip()
@@ -94,7 +94,7 @@ def unusual_numbers(section: BaseModel) -> Iterator[str]:
 
 
 def beyond_real(section: BaseModel) -> str:
-    """Return what no real arm may have of the numbers, "" where there is nothing."""
+    """Describe the first number that a real arm may not have, else ""."""
     for place, _, usual, value in _usual_numbers(section, ""):
         if usual.real is not None and value > usual.real:
             return f"{place} = {value:g} - expected <= {usual.real:g} {usual.unit}"
@@ -109,17 +109,17 @@ def _usual_numbers(
         here = f"{place}.{name}".lstrip(".")
         value: Any = getattr(section, name)
         if isinstance(value, dict):  # sections by name
-            for key, each in cast("dict[str, Any]", value).items():
-                if isinstance(each, BaseModel):
-                    yield from _usual_numbers(each, f"{here}.{key}")
+            for key, inner in cast("dict[str, Any]", value).items():
+                if isinstance(inner, BaseModel):
+                    yield from _usual_numbers(inner, f"{here}.{key}")
             continue
         items = cast("tuple[Any, ...]", value) if isinstance(value, tuple) else (value,)
-        for index, each in enumerate(items):
+        for index, entry in enumerate(items):
             item = index if isinstance(value, tuple) else None
             there = here if item is None else f"{here}[{item}]"
-            if isinstance(each, BaseModel):
-                yield from _usual_numbers(each, there)
-            elif each is not None and (number := number_at(field, item)) is not None:
+            if isinstance(entry, BaseModel):
+                yield from _usual_numbers(entry, there)
+            elif entry is not None and (number := number_at(field, item)) is not None:
                 usual = _usual(number)
                 if usual is not None:
-                    yield there, number, usual, each
+                    yield there, number, usual, entry

@@ -1,4 +1,4 @@
-"""Every setting by its dotted name: its value, and where it comes from."""
+"""Origins of settings: every dotted name with its value and source."""
 
 from collections.abc import Mapping, Sequence
 from typing import cast
@@ -34,7 +34,7 @@ def flatten(value: object, prefix: str = "") -> dict[str, object]:
 def origin_lines(settings: Settings) -> list[str]:
     """Return one line per setting: name, value, file and line it comes from.
 
-    A cell is one line: it is made of several tables.
+    A cell is one line, since it is made of several tables.
     """
     matrix = settings.matrix
     origin = _origin(settings, "matrix.toml")
@@ -57,11 +57,11 @@ def _lines(
     """Return one line per value of a file.
 
     Args:
-        settings: all of them.
-        values: what is in force.
-        given: what the file states.
-        text: of the file.
-        file: its name.
+        settings: all settings.
+        values: values in force.
+        given: values stated in the file.
+        text: text of the file.
+        file: name of the file.
     """
     origin, stated = _origin(settings, file), flatten(given)
     lines: list[str] = []
@@ -82,7 +82,7 @@ def _origin(settings: Settings, file: str) -> str:
 
 
 def _cell(row: TerrainRow) -> str:
-    """Return a cell of a matrix with everything that was stated or taken for it."""
+    """Return a cell of the matrix with all stated and default values."""
     factors = ", ".join(f"{n} {value_text(v)}" for n, v in row.factors.items())
     where = row.place or f"far end {list(row.far_end)}"
     return (

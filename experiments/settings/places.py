@@ -1,4 +1,4 @@
-"""Places: where containers stand, in rig.toml or as taught by hand."""
+"""Places of containers, stated in rig.toml or taught by hand."""
 
 from pydantic import Field
 
@@ -13,7 +13,8 @@ class StatedPlace(SettingsSection):
     Attributes:
         far_end: point of the ground where trials start, in the base frame [m].
         heading_deg: direction from the base to the container [degrees].
-        incline_deg: of the container, positive where its far end is high [degrees].
+        incline_deg: incline of the container, positive if its far end is high
+            [degrees].
         travel: length of a trial [m].
         start: joints with the foot at the far end [rad]; left out: computed.
         calibration: file of `traction calibrate terrain`.
@@ -32,25 +33,25 @@ class StatedPlace(SettingsSection):
 
     @property
     def has_numbers(self) -> bool:
-        """Whether it states where it is."""
+        """Whether the place states its location."""
         stated = self.far_end, self.heading_deg, self.incline_deg, self.travel
-        return any(each is not None for each in stated)
+        return any(value is not None for value in stated)
 
 
 class TaughtPlace(TomlFile):
     """A file of `traction teach`.
 
     Attributes:
-        place: its name.
+        place: name of the place.
         far_end: point of the ground where trials start, in the base frame [m].
         heading_deg: direction from the base to the container [degrees].
-        incline_deg: of the line between the two ends [degrees].
+        incline_deg: incline of the line between the two ends [degrees].
         travel: length of a trial [m].
         start: joints with the foot at the far end [rad].
-        foot: with which it was touched.
-        arm: serial numbers of the arm's pucks, of joints 1 to 7.
-        measured_utc: when.
-        simulated: on simulated devices.
+        foot: foot with which it was touched.
+        arm: serial numbers of the arm's pucks, joints 1 to 7.
+        measured_utc: time of the measurement.
+        simulated: whether the devices were simulated.
         spread_mm: largest distance between repeated touches of one end [mm].
     """
 
@@ -67,7 +68,7 @@ class TaughtPlace(TomlFile):
     spread_mm: float = Field(ge=0)
 
     def as_place(self, name: str) -> StatedPlace:
-        """Return the place that it describes; `name` is its file."""
+        """Return the taught place; `name` is its file."""
         return StatedPlace(
             far_end=self.far_end,
             heading_deg=self.heading_deg,

@@ -1,4 +1,4 @@
-"""What may stand in rig.toml."""
+"""Schema of rig.toml."""
 
 from typing import Annotated, Any, Literal, Self
 
@@ -19,7 +19,7 @@ from ft_sensor.reading import largest_load
 from ft_sensor.vendors.registry import AnySensor
 from wam.calibration.arm_identity import SerialNumbers
 
-WITHIN_RANGE = 0.9  # of the sensor's range: a default limit of contact
+WITHIN_RANGE = 0.9  # share of the sensor's range for default contact limits
 CONTACT_LIMITS = (
     "contact_force",
     "contact_force_hold",
@@ -27,15 +27,15 @@ CONTACT_LIMITS = (
     "contact_moment_hold",
     "contact_growth",
 )
-LOCK_DAMPING = 0.0075  # s, least lock_kd over lock_kp: see `ControlSection`
+LOCK_DAMPING = 0.0075  # s, least ratio of lock_kd to lock_kp
 _Turn = Annotated[Whole, Field(ge=0, lt=65536)]  # counts of one motor turn
 _Angle = Annotated[Number, Field(ge=-6.3, le=6.3), UsualRange(-4.0, 4.0, "rad")]
 _Aside = Annotated[Number, Field(ge=-0.1, le=0.1), UsualRange(-0.05, 0.05, "m")]
 _Below = Annotated[Number, Field(ge=0.02, le=0.25), UsualRange(0.03, 0.2, "m")]
 _OnPlate = tuple[_Aside, _Aside, _Below]  # in frame 7
 _Inertia = Annotated[Number, Field(ge=1e-6, le=0.05), UsualRange(1e-5, 2e-3, "kg m^2")]
-# Speeds up to twice the shipped limits, torques up to the shipped ones: more the motors
-# give, but no trial needs, and less than its weight lets the arm sink.
+# Speeds up to twice the shipped limits, torques up to the shipped ones: the motors can
+# give more, but no trial needs it; with less torque than its weight the arm sinks.
 _ShoulderSpeed = Annotated[Number, Field(gt=0, le=3.0), UsualRange(0.3, 2.2, "rad/s")]
 _UpperArmSpeed = Annotated[Number, Field(gt=0, le=4.0), UsualRange(0.4, 3.0, "rad/s")]
 _ElbowSpeed = Annotated[Number, Field(gt=0, le=5.0), UsualRange(0.5, 3.7, "rad/s")]
@@ -73,16 +73,16 @@ class CanSettings(SettingsSection):
 
 
 class ArmSection(SettingsSection):
-    """This arm.
+    """Data of this arm.
 
     Attributes:
         mech_at_home: absolute angles of the motors at the home position [counts], as
-            "traction zero" tells them; left out: the next zeroing is not checked.
-        rest: joint positions of the arm whose foot lies on its stand [rad]; left out:
-            a person supports the arm before it goes idle.
-        serial_numbers: of the seven pucks that they were read from; left out: any arm.
-        properties: file with what the pucks of this arm say of themselves, where that
-            is not what a WAM has from the factory; a path from the folder of rig.toml.
+            printed by "traction zero"; omitted: the next zeroing is not checked.
+        rest: joint positions with the foot on its stand [rad]; omitted: a person
+            supports the arm before it goes idle.
+        serial_numbers: serial numbers of the seven pucks; omitted: any arm.
+        properties: file with the properties of this arm's pucks if they differ from the
+            factory's; a path relative to the folder of rig.toml.
     """
 
     mech_at_home: tuple[_Turn, _Turn, _Turn, _Turn, _Turn, _Turn, _Turn] | None = Field(
@@ -98,12 +98,12 @@ class ArmSection(SettingsSection):
 
 
 class SimulatedSole(SettingsSection):
-    """Friction of a sole on a plate, for the simulation; its equation: `fakes.ground`.
+    """Friction of a sole on a plate, for the simulation; equation: `fakes.ground`.
 
     Attributes:
-        mu_s: share of the normal force that holds it at rest.
-        mu_k: the same while it slides.
-        v_S: velocity at which one turns into the other [m/s].
+        mu_s: coefficient of static friction.
+        mu_k: coefficient of kinetic friction.
+        v_S: Stribeck velocity [m/s].
         b: viscous friction [N s/m].
     """
 
@@ -123,10 +123,10 @@ class FootSection(SettingsSection):
     """A foot with its adapter, in frame 7.
 
     Attributes:
-        shape: of the sole; recorded with its trials.
-        area: of the sole [m^2]; recorded with its trials.
-        simulate: its friction on a plate, where it is simulated; left out: that of the
-            foot with tread.
+        shape: shape of the sole; recorded with its trials.
+        area: area of the sole [m^2]; recorded with its trials.
+        simulate: its friction on a plate in a simulation; omitted: that of the foot
+            with tread.
     """
 
     mass: Annotated[Number, UsualRange(0.1, 1.5, "kg")] = Field(
@@ -145,17 +145,17 @@ class FootSection(SettingsSection):
     simulate: SimulatedSole | None = None
 
     def plain(self) -> dict[str, Any]:
-        """Return it in plain values, without what it does not state of its sole."""
+        """Return plain values, without unset fields of the sole."""
         values = self.model_dump(mode="json")
-        few = ("shape", "area", "simulate")
-        return {k: v for k, v in values.items() if k not in few or v is not None}
+        optional = ("shape", "area", "simulate")
+        return {k: v for k, v in values.items() if k not in optional or v is not None}
 
 
 class ControlSection(SettingsSection):
-    """The control law's numbers.
+    """Parameters of the control law.
 
-    Within these bounds the lock is stable with the shipped foot where torques come a
-    whole cycle after the positions that they follow from, in every pose.
+    Within these bounds the lock is stable in every pose, with the shipped foot and a
+    delay of a whole cycle from positions to torques.
     """
 
     virtual_mass: Annotated[Number, UsualRange(0.0, 1.0, "kg")] = Field(
@@ -180,10 +180,10 @@ class ControlSection(SettingsSection):
 
 
 class GravitySection(SettingsSection):
-    """Which model of gravity floats the arm.
+    """Gravity model of the control law.
 
     "cad": masses of the drawings; "shipped": first moments of another arm;
-    "calibrated": those of `file`, a path from the folder of rig.toml.
+    "calibrated": those of `file`, a path relative to the folder of rig.toml.
     """
 
     model: Literal["cad", "shipped", "calibrated"] = Field(examples=["cad"])
@@ -191,12 +191,13 @@ class GravitySection(SettingsSection):
 
 
 class FrictionSettings(SettingsSection):
-    """Which dry friction of the drives is taken off the hand while the arm floats.
+    """Compensation of the drives' dry friction while the arm floats.
 
     Attributes:
-        model: "none"; "calibrated": that of `file`, a path from the folder of rig.toml.
+        model: "none"; "calibrated": that of `file`, a path relative to the folder of
+            rig.toml.
         file: the calibration.
-        compensation: share of what the calibration surely found.
+        compensation: share of the lower confidence bound of the calibrated friction.
     """
 
     model: Literal["none", "calibrated"] = Field(default="none", examples=["none"])
@@ -207,18 +208,18 @@ class FrictionSettings(SettingsSection):
 
     @property
     def share(self) -> float:
-        """Share that is taken off, 0 without a calibration."""
+        """Compensated share, 0 without a calibration."""
         return self.compensation if self.model == "calibrated" else 0.0
 
 
 class LimitSection(SettingsSection):
-    """Where the guard steps in, with the names and units of `GuardLimits`; and others.
+    """Limits of the guard, with the names and units of `GuardLimits`; and others.
 
-    `tare_spread`, `residual` and `free_disk_gb` are looked at between trials. The
-    contact of a push: up to 60 N along the ground, 30 N across it. A trial ends at 100
-    N and the arm holds at 150 N, and at their moments with the foot's 0.1 m between
-    sole and sensor; what is left out or has these values is 0.9 of the range of a
-    sensor that measures less, see `RigSettings.lowered_limits`.
+    `tare_spread`, `residual` and `free_disk_gb` are checked between trials. A push
+    needs up to 60 N along the ground and 30 N across it. A trial ends at 100 N and the
+    arm holds at 150 N, and at the corresponding moments with 0.1 m between sole and
+    sensor. For a sensor of smaller range, omitted limits and these values become 0.9 of
+    the range, see `RigSettings.lowered_limits`.
     """
 
     speed: _Speeds = Field(examples=[[1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0]])
@@ -277,7 +278,7 @@ class LimitSection(SettingsSection):
         return self
 
     def of_guard(self) -> dict[str, Any]:
-        """Return the values of those fields that the guard has."""
+        """Return the values of the fields of `GuardLimits`."""
         names = GuardLimits.__dataclass_fields__.keys() & type(self).model_fields.keys()
         return {name: getattr(self, name) for name in names}
 
@@ -289,7 +290,7 @@ _ModuleTorque = Annotated[
 
 
 class SafetySection(SettingsSection):
-    """What the safety module tolerates; a warning left out is 0.9 of its fault."""
+    """Limits of the safety module; an omitted warning is 0.9 of its fault."""
 
     speed_warning: _ModuleSpeed | None = Field(default=None, examples=[0.5])
     speed_fault: _ModuleSpeed = Field(examples=[1.0])
@@ -297,7 +298,7 @@ class SafetySection(SettingsSection):
     torque_fault_units: _ModuleTorque = Field(examples=[5204])
 
 
-# What the module does by itself after power-up.
+# Defaults of the module after power-up.
 _POWER_UP = SafetySection(
     speed_warning=0.5,
     speed_fault=1.0,
@@ -307,12 +308,12 @@ _POWER_UP = SafetySection(
 
 
 class LoopSection(SettingsSection):
-    """How the loop keeps time.
+    """Timing of the loop.
 
     Attributes:
-        spin_us: it stops sleeping so long before each deadline and watches the time;
-            for a kernel that wakes late. It costs the share of the core.
-        test_time: the preflight measures the loop for so long.
+        spin_us: busy-waiting before each deadline, for a kernel that wakes late, at the
+            cost of that share of a core.
+        test_time: duration of the preflight's test of the loop.
     """
 
     spin_us: Annotated[Number, UsualRange(0.0, 300.0, "us")] = Field(
@@ -324,11 +325,11 @@ class LoopSection(SettingsSection):
 
 
 class OperatorSection(SettingsSection):
-    """How the program and the person at the arm tell each other something.
+    """Cues between program and operator.
 
     Attributes:
-        bell: the terminal rings at the start, when too fast, and at the end.
-        speech: the same is spoken where a speech program is installed.
+        bell: ring the terminal's bell at the start, when too fast, and at the end.
+        speech: speak the same cues if a speech program is installed.
         double_tap: two presses of the foot start a trial, and keep it.
     """
 
@@ -367,29 +368,29 @@ class RigSettings(SettingsSection):
         return self
 
     def lowered_limits(self) -> dict[str, float]:
-        """Return the contact limits of the guard that the fitted sensor lowers.
+        """Return the contact limits lowered by the range of the sensor.
 
-        A limit that has its default value is `WITHIN_RANGE` of what the sensor measures
-        at most; none that ends a trial is above that of hold.
+        A limit with its default value is at most `WITHIN_RANGE` of the range; a limit
+        that ends a trial never exceeds that of hold.
         """
         lowered: dict[str, float] = {}
-        for name, (seen, _) in self._measured().items():
+        for name, (reach, _) in self._measured().items():
             least = 0.0
             if name.endswith("_hold"):
                 ends = name.removesuffix("_hold")
                 own: float = getattr(self.limits, ends)
                 least = lowered.get(ends, own)
-            limit, most = getattr(self.limits, name), max(WITHIN_RANGE * seen, least)
+            limit, most = getattr(self.limits, name), max(WITHIN_RANGE * reach, least)
             if limit == LimitSection.model_fields[name].default and limit > most:
                 lowered[name] = most
         return lowered
 
     def guard_limits(self) -> dict[str, Any]:
-        """Return the limits of the guard as it has them, with this sensor."""
+        """Return the limits of the guard, lowered for this sensor."""
         return {**self.limits.of_guard(), **self.lowered_limits()}
 
     def _measured(self) -> dict[str, tuple[float, str]]:
-        """Return by contact limit what the sensor measures at most, with the unit."""
+        """Return the range of the sensor by contact limit, with the unit."""
         ranges = self.ft_sensor.known_ranges()
         if ranges is None:
             return {}

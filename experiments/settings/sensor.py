@@ -1,11 +1,11 @@
-"""The wrist sensor of rig.toml as a device."""
+"""Build the wrist sensor of rig.toml."""
 
 from acquisition.errors import SettingsError
 from ft_sensor.section import SensorSection
 from ft_sensor.serial_line.link import PortSettings
 from ft_sensor.serial_line.sensor import SerialDevice
 
-_SIMULATED_CHECK = 0.5  # s; a simulated rate is what it says
+_SIMULATED_CHECK = 0.5  # s, since a simulated rate is exact
 
 
 def build_device(
@@ -14,7 +14,7 @@ def build_device(
     """Return the serial sensor that `section` describes; None if it is on the bus.
 
     Raises:
-        SettingsError: something that kind needs is missing, or it cannot do it.
+        SettingsError: an option of that kind is missing or invalid.
     """
     line = PortSettings(section.port, section.baudrate)
     if is_simulated:

@@ -1,4 +1,4 @@
-"""What a second screen gets: topics, and the messages of one sample."""
+"""Topics of the second screen, and the messages of one sample."""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
@@ -16,7 +16,7 @@ from acquisition.trial_file.writer import TRIAL_TOPICS
 
 TF_TOPIC = "/tf"
 DESCRIPTION_TOPIC, EVENTS_TOPIC = "/robot_description", "/events"
-# As recorded, with the transforms that a recording leaves to its viewer.
+# Topics of recordings, and transforms, which recordings leave to the viewer.
 LIVE_TOPICS: Mapping[str, str] = {
     DESCRIPTION_TOPIC: TRIAL_TOPICS[DESCRIPTION_TOPIC],
     "/cycle": TRIAL_TOPICS["/cycle"],
@@ -30,12 +30,12 @@ _Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class LinkTransform:
-    """How a link stands in the one before it.
+    """Pose of a link in its parent.
 
     Attributes:
-        parent: name of the link before it.
-        child: its name.
-        translation: of its origin [m], shape (3,).
+        parent: name of the parent link.
+        child: name of the link.
+        translation: position of its origin [m], shape (3,).
         rotation: quaternion x y z w, shape (4,).
     """
 
@@ -52,7 +52,7 @@ class _Joint:
     xyz: _Array
     rotation: _Array
     axis: _Array
-    index: int | None  # of the joint position; None = fixed
+    index: int | None  # index of the joint position; None = fixed
 
 
 class ArmFrames:
@@ -68,7 +68,7 @@ class ArmFrames:
             moving += is_moving
 
     def transforms(self, position: _Array) -> list[LinkTransform]:
-        """Return how every link stands at joint positions [rad], shape (7,)."""
+        """Return the poses of all links at joint positions [rad], shape (7,)."""
         return [
             LinkTransform(j.parent, j.child, j.xyz, _turned(j, position))
             for j in self._joints
@@ -78,21 +78,21 @@ class ArmFrames:
 def encode_tf(transforms: Sequence[LinkTransform], t_ns: int) -> bytes:
     """Return a tf2_msgs/TFMessage payload of UTC `t_ns` [ns]."""
     writer = CdrWriter().scalar("I", len(transforms))
-    for one in transforms:
-        writer.header(t_ns, one.parent).string(one.child)
-        writer.array(one.translation).array(one.rotation)
+    for link in transforms:
+        writer.header(t_ns, link.parent).string(link.child)
+        writer.array(link.translation).array(link.rotation)
     return writer.finish()
 
 
 class LiveEncoder:
-    """Turns one sample into the messages of all topics that follow from it."""
+    """Encodes one sample as messages of all topics."""
 
     def __init__(self, urdf: str, config: str) -> None:
-        """Take the arm as its URDF.
+        """Read arm and sensor mounting.
 
         Args:
-            urdf: of the arm.
-            config: text of rig.toml, which has how the sensor is mounted.
+            urdf: URDF of the arm.
+            config: text of rig.toml, with the mounting of the sensor.
         """
         self.description = encode_string(urdf)
         self._frames = ArmFrames(urdf)
@@ -106,10 +106,10 @@ class LiveEncoder:
         self._sensor = LinkTransform(PLATE, SENSOR, at, turn)
 
     def messages(self, record: np.void, t_ns: int) -> dict[str, bytes]:
-        """Return topic to payload of a record of traction_msgs/Cycle.
+        """Return the payloads of a record of traction_msgs/Cycle, by topic.
 
         Args:
-            record: one record; it is not changed.
+            record: one record, not modified.
             t_ns: its UTC [ns].
         """
         stamped = record.copy()
@@ -167,11 +167,11 @@ def _turned(joint: _Joint, position: _Array) -> _Array:
 
 
 def _about(axis: _Array, angle: float) -> _Array:
-    """Return the quaternion x y z w of a turn by `angle` [rad] about a unit axis."""
+    """Quaternion x y z w of a rotation by `angle` [rad] about a unit axis."""
     return np.append(np.sin(0.5 * angle) * axis, np.cos(0.5 * angle))
 
 
 def _product(a: _Array, b: _Array) -> _Array:
-    """Return the quaternion x y z w of the turn `b` followed by `a`."""
+    """Quaternion x y z w of rotation `b` followed by `a`."""
     vector = a[3] * b[:3] + b[3] * a[:3] + np.cross(a[:3], b[:3])
     return np.append(vector, a[3] * b[3] - a[:3] @ b[:3])

@@ -1,4 +1,4 @@
-"""A recorded trial shown again, on the screen or to viewers; nothing moves."""
+"""Playback of a recorded trial, on the screen or to viewers; nothing moves."""
 
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -25,19 +25,19 @@ from experiments.operator.console import Console
 from experiments.operator.graphs import LiveScales
 from experiments.operator.screens import RecordingView, recording_lines
 
-_PICTURES = 8  # per second of the person's time
-_LINES = 1.0  # seconds of the trial between two lines without a terminal
+_PICTURES = 8  # screen updates per second of real time
+_LINES = 1.0  # s of the trial between lines without a terminal
 _HISTORY = 5.0  # s of traction in the sparklines
 _SERVE_NS = 20_000_000  # 50 Hz
-_DESCRIBE_EVERY = 50  # sendings between two of the arm's URDF
+_DESCRIBE_EVERY = 50  # the arm's URDF is sent every so many messages
 _ALL_MOTORS = 0x7F << MOTOR_FRESH_SHIFT
 
 
 def play(path: Path, speed: float, clock: Clock, console: Console) -> None:
-    """Show the trial in `path`, `speed` times as fast as it was.
+    """Show the trial in `path` at `speed` times real time.
 
     Raises:
-        TrialFileError: the file is no sound trial.
+        TrialFileError: the file is no valid trial.
     """
     trial = load_trial(path)
     start_ns = clock.now_ns()
@@ -60,7 +60,7 @@ def play(path: Path, speed: float, clock: Clock, console: Console) -> None:
 
 
 def _scales_of(path: Path) -> LiveScales:
-    """Return the scales of the limits that were set when it was recorded."""
+    """Return the scales for the limits in force at the recording."""
     window = PrepareOptions()
     used_speeds = (window.slowest, window.fastest)
     config = TrialReader(path).attachments.get("config.toml", b"")
@@ -68,16 +68,16 @@ def _scales_of(path: Path) -> LiveScales:
         limits: Any = parse_toml(config.decode()).get("limits", {})
     except ValueError:
         return LiveScales(used_speeds)
-    known = {
+    positive = {
         field.name: float(limits[field.name])
         for field in fields(LiveScales)
         if isinstance(limits.get(field.name), float | int) and limits[field.name] > 0
     }
-    return LiveScales(used_speeds, **known)
+    return LiveScales(used_speeds, **positive)
 
 
 def _rows(trial: RecordedTrial, step: float) -> Iterator[int]:
-    """Give the rows of the trial at every `step` seconds, the last one included."""
+    """Yield the rows of the trial every `step` seconds, including the last one."""
     last = len(trial.t) - 1
     at = 0.0
     while (row := int(np.searchsorted(trial.t, at))) < last:
@@ -117,21 +117,24 @@ def _line(trial: RecordedTrial, row: int) -> str:
 
 @dataclass(slots=True)
 class _Player:
-    """Where a served playback stands.
+    """State of a served playback.
 
     Attributes:
         t_ns: log times of the cycles [UTC ns], shape (n,).
-        wish: how it runs now.
-        row: of the newest cycle that was sent.
+        wish: present mode of playback.
+        row: row of the last cycle sent.
     """
 
     t_ns: NDArray[np.int64]
     wish: PlaybackWish
     row: int = -1
-    _from: tuple[int, int] = (0, 0)  # when [ns] it was at which UTC [ns]
+    _from: tuple[int, int] = (
+        0,
+        0,
+    )  # real time [ns] and position [UTC ns] of the last change
 
     def follow(self, wish: PlaybackWish, now_ns: int) -> None:
-        """Run as wished from now on."""
+        """Change the mode of playback."""
         at = self.position(now_ns) if wish.seek_ns is None else wish.seek_ns
         at = min(max(at, int(self.t_ns[0])), int(self.t_ns[-1]))
         if wish.seek_ns is not None:
@@ -139,7 +142,7 @@ class _Player:
         self.wish, self._from = wish, (now_ns, at)
 
     def position(self, now_ns: int) -> int:
-        """Return where it stands [UTC ns]."""
+        """Position of the playback [UTC ns]."""
         began_ns, at = self._from
         is_moving = self.wish.is_playing
         passed = round((now_ns - began_ns) * self.wish.speed) if is_moving else 0
@@ -161,7 +164,7 @@ def serve(
     """Serve the trial in `path` to viewers, which may pause and seek, until it is over.
 
     Raises:
-        TrialFileError: the file is no sound trial.
+        TrialFileError: the file is no valid trial.
         MissingLibraryError: foxglove-sdk is not installed.
         SettingsError: the port is taken.
     """
@@ -205,9 +208,9 @@ def _send(
     encoder: LiveEncoder,
     now_ns: int,
 ) -> None:
-    """Send what lies between the newest message and where the playback stands.
+    """Send the messages up to the position of the playback.
 
-    Cycles go out at 50 Hz of the person's time, the newest of each share.
+    Cycles are sent at 50 Hz of real time, the latest of each period.
     """
     at = player.position(now_ns)
     row = int(np.searchsorted(player.t_ns, at, side="right")) - 1

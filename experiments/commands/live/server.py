@@ -16,24 +16,24 @@ if TYPE_CHECKING:
     from foxglove.websocket import PlaybackControlRequest, ServerListener
 
 HOST, PORT = "127.0.0.1", 8765
-BACKLOG = 64  # messages that wait for one slow client; the oldest are dropped
+BACKLOG = 64  # queued messages per client; the oldest are dropped
 LAYOUT_FILE = "foxglove_layout.json"
 
 
 def layout_path() -> Path:
-    """Return the file of the layout that is shipped."""
+    """Return the file of the shipped layout."""
     return Path(str(resources.files("experiments.data") / LAYOUT_FILE))
 
 
 @dataclass(frozen=True, slots=True)
 class PlaybackWish:
-    """What a viewer wants of a playback.
+    """Request of a viewer to a playback.
 
     Attributes:
-        is_playing: it is to run.
-        speed: times as fast as it was recorded.
-        seek_ns: where to go first [UTC ns]; None = stay.
-        request_id: of the wish, to be answered.
+        is_playing: run or pause.
+        speed: multiple of real time.
+        seek_ns: position to seek first [UTC ns]; None = none.
+        request_id: identifier for the reply.
     """
 
     is_playing: bool
@@ -43,7 +43,7 @@ class PlaybackWish:
 
 
 def _listener(hear: Callable[[PlaybackWish], None]) -> ServerListener:
-    """Return what takes the wishes of viewers; called on a thread of the library."""
+    """Return the listener to viewers' requests, called on a thread of the library."""
     from foxglove.websocket import PlaybackCommand, ServerListener
 
     class Wishes(ServerListener):
@@ -65,7 +65,7 @@ def _listener(hear: Callable[[PlaybackWish], None]) -> ServerListener:
 
 
 def _channels(topics: Mapping[str, str], context: Context) -> dict[str, Channel]:
-    """Return a channel for each topic, whose messages are CDR of a ROS 2 type."""
+    """Return a channel per topic, for CDR messages of a ROS 2 type."""
     from foxglove import Channel, Schema
 
     return {
@@ -84,14 +84,14 @@ def _channels(topics: Mapping[str, str], context: Context) -> dict[str, Channel]
 
 
 class LiveServer:
-    """Serves channels on 127.0.0.1; a client can read, and nothing else.
+    """Serves channels on 127.0.0.1, read-only for clients.
 
     A client that does not read costs no more than its backlog: its oldest messages are
-    dropped. The library has threads of its own; a process with a control loop must
-    never make such a server.
+    dropped. The library starts threads: a process with a control loop must never create
+    a server.
 
     Attributes:
-        port: where it listens.
+        port: the port.
     """
 
     def __init__(
@@ -102,13 +102,13 @@ class LiveServer:
         span_ns: tuple[int, int] | None = None,
         hear: Callable[[PlaybackWish], None] | None = None,
     ) -> None:
-        """Begin to serve.
+        """Start serving.
 
         Args:
-            port: where to listen; 0 = any that is free.
-            topics: topic to type of its messages, CDR.
-            span_ns: of a playback that viewers may control [UTC ns]; None = live.
-            hear: takes what viewers want of the playback, on another thread.
+            port: port; 0 = any free one.
+            topics: message types by topic, CDR.
+            span_ns: span of a playback that viewers may control [UTC ns]; None = live.
+            hear: receives the viewers' requests, on another thread.
 
         Raises:
             MissingLibraryError: foxglove-sdk is not installed.
@@ -119,7 +119,7 @@ class LiveServer:
             from foxglove.websocket import Capability
         except ImportError as error:
             raise MissingLibraryError("foxglove-sdk", "live") from error
-        foxglove.set_log_level("CRITICAL")  # a client that hangs up is no news
+        foxglove.set_log_level("CRITICAL")  # suppress messages on closed clients
         self._context = context = foxglove.Context()  # its end closes the channels
         capabilities = [Capability.Time]
         if span_ns is not None:
@@ -144,16 +144,16 @@ class LiveServer:
         self.port: int = self._server.port
 
     def publish(self, messages: Mapping[str, bytes], t_ns: int) -> None:
-        """Send messages of UTC `t_ns` [ns], by topic, to everyone who reads them."""
+        """Send messages of UTC `t_ns` [ns], by topic, to all clients."""
         for topic, payload in messages.items():
             self._channels[topic].log(payload, log_time=t_ns)
 
     def tell_time(self, t_ns: int) -> None:
-        """Tell viewers the newest time [UTC ns]: one that lags shows it."""
+        """Send the latest time [UTC ns], by which viewers show their lag."""
         self._server.broadcast_time(t_ns)
 
     def tell_playback(self, wish: PlaybackWish, t_ns: int, *, is_over: bool) -> None:
-        """Tell viewers how a playback stands after `wish`, at UTC `t_ns` [ns]."""
+        """Send the state of a playback after `wish`, at UTC `t_ns` [ns]."""
         from foxglove.websocket import PlaybackState, PlaybackStatus
 
         status = PlaybackStatus.Playing if wish.is_playing else PlaybackStatus.Paused
@@ -168,5 +168,5 @@ class LiveServer:
         )
 
     def close(self) -> None:
-        """Hang up; safe to repeat."""
+        """Close all connections; safe to repeat."""
         self._server.stop()

@@ -1,9 +1,8 @@
-"""A session that another process records, served to viewers 50 times a second.
+"""Serve a session recorded by another process to viewers, 50 times a second.
 
-The ring buffers of the session lie in memory without a name. They are opened anew for
-reading through the console's entry in /proc, which asks nothing of any process of the
-session: nothing can be written, nobody waits, and whatever happens here goes unnoticed
-there.
+The ring buffers of the session are in anonymous shared memory. They are opened
+read-only through the console's entry in /proc, without involving any process of the
+session: this process can neither write nor delay it.
 """
 
 from collections.abc import Callable, Mapping
@@ -31,23 +30,23 @@ from wam.model.constants import load_constants
 
 PERIOD_NS = 20_000_000  # 50 Hz
 NICE = 10
-_LOOK_EVERY = 25  # periods between two looks for the session's process
+_LOOK_EVERY = 25  # periods between checks of the session's process
 _EVENT_LEVEL, _EVENT_NAME = 20, "session"
-# Fields of the journal without news, and many numbers.
+# Fields of the journal that are not shown.
 _HIDDEN = {"event", "utc", "fake", "config", "recording"}
 
 
 class WatchedSession:
-    """One session of another process, as messages."""
+    """A session of another process, as messages."""
 
     def __init__(
         self, folder: SessionFolder, shared: SharedLayout, clock: Clock
     ) -> None:
-        """Begin with the newest sample; what was written before is left alone.
+        """Start with the latest sample.
 
         Args:
-            folder: of the session.
-            shared: its memory, read only.
+            folder: folder of the session.
+            shared: its shared memory, read-only.
             clock: monotonic time and UTC of this computer.
         """
         self.folder = folder
@@ -62,11 +61,11 @@ class WatchedSession:
         self._encoder = LiveEncoder(urdf(load_constants()), text)
 
     def description(self) -> dict[str, bytes]:
-        """Return the arm's URDF, which late viewers need too."""
+        """Return the arm's URDF as a message, repeated for late viewers."""
         return {DESCRIPTION_TOPIC: self._encoder.description}
 
     def newest(self) -> tuple[dict[str, bytes], int] | None:
-        """Return messages of the newest sample and its UTC [ns]; None if it is old."""
+        """Return messages of the latest sample and its UTC [ns]; None if it is old."""
         if self._shared.cycles.written == self._seen:
             return None
         self._seen = self._shared.cycles.written
@@ -77,7 +76,7 @@ class WatchedSession:
         return self._encoder.messages(records[0], t_ns), t_ns
 
     def events(self, now_ns: int) -> list[tuple[dict[str, bytes], int]]:
-        """Return the new entries of the journal, dated now [UTC ns]."""
+        """Return the new entries of the journal, stamped with `now_ns` [UTC ns]."""
         size = self._journal.stat().st_size if self._journal.exists() else 0
         if size == self._size:
             return []
@@ -93,7 +92,7 @@ class WatchedSession:
         ]
 
     def close(self) -> None:
-        """Give the memory back."""
+        """Release the memory."""
         self._shared.close()
 
 
@@ -104,7 +103,7 @@ def event_text(event: Mapping[str, Any]) -> str:
 
 
 def find_open(data: Path, name: str | None) -> tuple[SessionFolder, int] | None:
-    """Return the newest session that a living process has open, with its number.
+    """Return the latest session that a living process has open, with its pid.
 
     Args:
         data: the data folder.
@@ -128,13 +127,13 @@ def watch(
     clock: Clock,
     is_over: Callable[[], bool],
 ) -> None:
-    """Serve what is recorded below `data`, session after session, until it `is_over`.
+    """Serve the sessions recorded below `data`, one after another, until `is_over`.
 
     Raises:
         MissingLibraryError: foxglove-sdk is not installed.
         SettingsError: the port is taken.
         SessionError: the session belongs to another user.
-        LinkError: it is recorded by another version of this program.
+        LinkError: the session is recorded by another version of this program.
     """
     _, core = choose_cores()
     request(RealtimeRequest(nice=NICE, core=core))
@@ -154,10 +153,10 @@ def watch(
 
 
 def _open(data: Path, name: str | None, clock: Clock) -> WatchedSession | None:
-    found = find_open(data, name)
-    if found is None:
+    match = find_open(data, name)
+    if match is None:
         return None
-    folder, pid = found
+    folder, pid = match
     try:
         shared = SharedLayout.of_process(pid)
     except PermissionError as error:
@@ -175,7 +174,7 @@ def _serve(
     clock: Clock,
     is_over: Callable[[], bool],
 ) -> None:
-    """Serve one session until its process has gone."""
+    """Serve one session until its process ends."""
     console.say(f"{session.folder.id} {session.folder.terrain} is on the screen.")
     due_ns = clock.now_ns()
     period = 0

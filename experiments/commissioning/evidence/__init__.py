@@ -1,6 +1,6 @@
-"""What is kept of a commissioning, and what it is worth today.
+"""Records of a commissioning, and their validity today.
 
-`order` names the steps and what each stands on, `record` and `daily_record` are the
-files, `gate` says whether torque may be sent; it is all that the preflight reads. Begin
-with `gate`.
+`order` lists the steps and their inputs, `record` and `daily_record` are the files,
+`gate` decides whether torque may be sent; the preflight uses nothing else. Begin with
+`gate`.
 """

@@ -1,7 +1,7 @@
-"""daily.json: what the short check of every day measured, day after day.
+"""daily.json: history of the daily checks.
 
-It is compared with the commissioning of the same arm; what drifts is seen before it
-fails.
+Each check is compared with the commissioning of the same arm, so that a drift shows
+before a failure.
 """
 
 import json
@@ -17,23 +17,23 @@ from experiments.commissioning.evidence.record import Measured, Raw, RecordPart,
 from experiments.dates import is_fresh
 
 NAME = "daily.json"
-FIELD = "daily_check"  # of the metadata of a recording
+FIELD = "daily_check"  # in the metadata of a recording
 _LARGEST = 16_000_000  # bytes
-_KEPT = 2000  # checks; older ones go
+_KEPT = 2000  # checks; older ones are dropped
 COUNTS_FOR = timedelta(hours=16)  # a day in the laboratory
 _HINT = "Put back the file as it was written, or move it away: its history begins anew."
 
 
 class DailyCheck(RecordPart):
-    """One check.
+    """One daily check.
 
     Attributes:
         started: UTC.
         ended: UTC.
-        operator: who did it.
-        raw: what was recorded.
-        quantities: what came of it, with its limits.
-        cause: the first contradiction, in words; "" = none.
+        operator: name of the operator.
+        raw: the recording.
+        quantities: results with their limits.
+        cause: the first contradiction; "" = none.
     """
 
     started: datetime
@@ -45,18 +45,18 @@ class DailyCheck(RecordPart):
 
     @property
     def words(self) -> str:
-        """When it was done and what came of it."""
+        """Time and result."""
         when = f"{self.ended:%Y-%m-%d %H:%M} UTC"
         return f"{when}, {self.cause or 'sound'}"
 
 
 class DailyHistory(RecordPart):
-    """All checks of an arm, the oldest first.
+    """All daily checks of an arm, oldest first.
 
     Attributes:
-        version: of the file.
-        is_simulated: the arm is.
-        checks: what was done.
+        version: version of the file format.
+        is_simulated: whether the arm is simulated.
+        checks: the checks.
     """
 
     version: Literal["1.0"] = FORMAT
@@ -64,23 +64,24 @@ class DailyHistory(RecordPart):
     checks: Many[DailyCheck] = ()
 
     def with_check(self, check: DailyCheck) -> Self:
-        """Return it with a check at its end."""
+        """Return the history with a check appended."""
         return self.model_copy(update={"checks": (*self.checks, check)[-_KEPT:]})
 
     def counts_at(self, now: datetime) -> bool:
-        """Return whether the last check has come and was done at most a day ago."""
+        """Return whether the last check is at most `COUNTS_FOR` old, and not ahead."""
         return bool(self.checks) and is_fresh(self.checks[-1].ended, now, COUNTS_FOR)
 
 
 def read_history(folder: Path, *, is_simulated: bool) -> DailyHistory:
-    """Return what stands in `folder`, or an empty history.
+    """Read the history in `folder`, or an empty one.
 
     Args:
-        folder: of commissioning.json.
-        is_simulated: the arm is; the history of the other kind is none of this arm.
+        folder: folder of commissioning.json.
+        is_simulated: whether the arm is simulated; a history of the other kind is
+            ignored.
 
     Raises:
-        SettingsError: it cannot be read, or is no such file.
+        SettingsError: the file cannot be read or is invalid.
     """
     path = folder / NAME
     try:
@@ -101,10 +102,10 @@ def _unreadable(path: Path, why: str) -> SettingsError:
 
 
 def write_history(folder: Path, history: DailyHistory) -> None:
-    """Write it whole, or leave the earlier one.
+    """Replace the history atomically.
 
     Raises:
-        OSError: it cannot be written.
+        OSError: the file cannot be written.
     """
     text = json.dumps(history.model_dump(mode="json"), indent=1) + "\n"
     with open_directory(folder) as directory:

@@ -1,4 +1,4 @@
-"""May torque be sent to this arm? What is missing, wrong or stale in its record."""
+"""Decision whether torque may be sent: missing, failed and stale steps."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -24,18 +24,18 @@ from experiments.rig.requests import LastAnswers
 from experiments.rig.rig import Rig
 from wam.driver.startup import ArmInfo
 
-FIELD = "commissioning"  # of the metadata of a recording
-COMPLETE = "complete"  # what it says of an arm that lacks nothing
+FIELD = "commissioning"  # in the metadata of a recording
+COMPLETE = "complete"  # value of a complete commissioning
 
 
 @dataclass(frozen=True, slots=True)
 class Lack:
-    """A step that does not count.
+    """A step that is not valid.
 
     Attributes:
-        step: which.
-        cause: why, in words.
-        subject: with what of several, e.g. a terrain; "" = there is one only.
+        step: the step.
+        cause: the reason.
+        subject: one of several, e.g. a terrain; "" = there is only one.
     """
 
     step: StepId
@@ -44,7 +44,7 @@ class Lack:
 
     @property
     def text(self) -> str:
-        """Return it in one line."""
+        """Return the lack in one line."""
         of = f" of {self.subject}" if self.subject else ""
         return f"{self.step} {self.step.words}{of}: {self.cause}"
 
@@ -55,14 +55,14 @@ def lacks(
     now: datetime,
     terrain: str = "",
 ) -> list[Lack]:
-    """Return every step that does not count, in order; `()` = all of them do.
+    """Return every step that is not valid, in order; [] = all are valid.
 
     Args:
-        record: what was done; None = nothing was.
-        inputs: digests of what steps stand on, as it is now; what is not known now is
-            no contradiction.
+        record: the commissioning; None = none was done.
+        inputs: present digests of the inputs of steps; an input unknown now is no
+            contradiction.
         now: UTC.
-        terrain: whose container is meant; "" = the one that was looked at last.
+        terrain: terrain of the container; "" = that of the last container.
     """
     return [
         Lack(step, cause, subject)
@@ -91,8 +91,8 @@ def _cause(
             continue
         if current is not None and then != current:
             when = record.told.get(name)
-            told = "" if when is None else f" on {when:%Y-%m-%d}, as told"
-            return f"stale: {BASES[name].words} changed{told}"
+            reported = "" if when is None else f" on {when:%Y-%m-%d}, as told"
+            return f"stale: {BASES[name].words} changed{reported}"
     if now - done.ended > timedelta(days=LONGEST_DAYS):
         return f"stale: done more than {LONGEST_DAYS} days ago"
     if is_ahead(done.ended, now):
@@ -101,10 +101,10 @@ def _cause(
 
 
 def require(found: list[Lack]) -> None:
-    """Refuse to send torque where a step that it needs does not count.
+    """Refuse to send torque unless all required steps are valid.
 
     Raises:
-        PreflightError: C0 to C11 are not all there, sound and not stale.
+        PreflightError: C0 to C11 are not all done, sound and up to date.
     """
     gated = [lack for lack in found if lack.step in GATED]
     if not gated:
@@ -125,52 +125,55 @@ def check_commissioned(
     made_anew: Collection[str] = (),
     sensor: Mapping[str, str] | None = None,
 ) -> dict[str, str]:
-    """Refuse torque for an arm that is not commissioned; return words for recordings.
+    """Refuse torque for an arm that is not commissioned; returns metadata.
 
     Args:
-        rig: a real one, started, its loop not running.
-        info: of the start.
-        add: takes the line for the page.
-        made_anew: names of `order.BASES` that the command measures anew.
-        sensor: what the wrist sensor says of itself; None = it was not asked.
+        rig: a real rig, started, its loop not running.
+        info: result of the start.
+        add: receives the lines of the page.
+        made_anew: names of `order.BASES` that the command measures again.
+        sensor: identity of the wrist sensor; None = not read.
 
     Raises:
-        PreflightError: a step that it needs is missing, wrong or stale.
+        PreflightError: a required step is missing, failed or stale.
     """
     now = datetime.fromtimestamp(rig.clock.utc_ns() // 1_000_000_000, UTC)
     try:
         record = read_commissioning(rig.settings.folder)
         if record is not None and record.is_simulated:
-            record = None  # of no real arm
+            record = None  # not of a real arm
         answers = rig.backend.ask(LastAnswers())
         present = present_inputs(rig, answers, info, sensor)
-        known = {name: each for name, each in present.items() if name not in made_anew}
-        found = lacks(record, known, now, rig.row.name)
-        require(found)
+        inputs = {
+            name: digest for name, digest in present.items() if name not in made_anew
+        }
+        missing = lacks(record, inputs, now, rig.row.name)
+        require(missing)
     except TractionError as error:
         add(BAD, FIELD, error.message)
         raise PreflightError(
             error.message, hint=error.hint, arm_state=IDLE_ARM
         ) from error
-    said_daily = _check_daily(rig, record, now, add)
-    further = [lack.text for lack in found if lack.step not in GATED]
+    daily_text = _check_daily(rig, record, now, add)
+    further = [lack.text for lack in missing if lack.step not in GATED]
     if further:
         text = f"uncommissioned: {'; '.join(further)}"
         add(WARNING, FIELD, text)
-        return {FIELD: text, DAILY_FIELD: said_daily}
+        return {FIELD: text, DAILY_FIELD: daily_text}
     add(GOOD, FIELD, "all steps, sound and not stale")
-    return {FIELD: COMPLETE, DAILY_FIELD: said_daily}
+    return {FIELD: COMPLETE, DAILY_FIELD: daily_text}
 
 
 def _check_daily(
     rig: Rig, record: Commissioning | None, now: datetime, add: AddLine
 ) -> str:
-    """Refuse an arm whose last daily check failed; return words for recordings.
+    """Refuse an arm whose last daily check failed; returns metadata.
 
-    Where there was none today, that is said. The day of the commissioning needs none.
+    A missing check today is only a warning; on the day of the commissioning none is
+    needed.
 
     Raises:
-        PreflightError: the last daily check failed, or its date has not come yet.
+        PreflightError: the last daily check failed, or its date is in the future.
     """
     try:
         history = read_history(rig.settings.folder, is_simulated=False)
@@ -180,9 +183,9 @@ def _check_daily(
             error.message, hint=error.hint, arm_state=IDLE_ARM
         ) from error
     ramps = record.of(StepId.RAMPS) if record is not None else None
-    proved = ramps.ended if ramps is not None else None
+    commissioned = ramps.ended if ramps is not None else None
     last = history.checks[-1] if history.checks else None
-    if last is not None and (proved is None or last.ended > proved):
+    if last is not None and (commissioned is None or last.ended > commissioned):
         if last.cause:
             add(BAD, "daily check", last.words)
             raise PreflightError(
@@ -197,7 +200,7 @@ def _check_daily(
         if history.counts_at(now):
             add(GOOD, "daily check", last.words)
             return last.words
-    elif proved is not None and is_fresh(proved, now, COUNTS_FOR):
+    elif commissioned is not None and is_fresh(commissioned, now, COUNTS_FOR):
         add(GOOD, "daily check", "commissioned today")
         return "commissioned today"
     text = "none today" if last is None else f"none today, the last one {last.words}"

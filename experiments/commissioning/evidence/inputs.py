@@ -1,4 +1,4 @@
-"""What the steps stand on, as it is now: digests by the names of `order.BASES`."""
+"""Present inputs of the steps: digests by the names of `order.BASES`."""
 
 import hashlib
 import json
@@ -22,21 +22,21 @@ def present_inputs(
     info: ArmInfo | None = None,
     sensor: Mapping[str, str] | None = None,
 ) -> dict[str, str]:
-    """Return the digest of everything that is known.
+    """Return the digests of all inputs known now.
 
     Args:
-        rig: with its settings and calibrations.
-        answers: what pucks 1 to 7 said of themselves; () = they were not asked.
-        info: of the start; None = it was not started.
-        sensor: what the wrist sensor says of itself; None = it was not opened.
+        rig: the rig with its settings and calibrations.
+        answers: properties of pucks 1 to 7; () = not read.
+        info: result of the start; None = not started.
+        sensor: identity of the wrist sensor; None = not opened.
     """
     section = rig.settings.rig
     arm = section.arm.model_dump(mode="json")
     zero = arm.pop("mech_at_home")
     texts, feet = rig.settings.calibrations, section.feet
-    names = (section.ft_sensor, *feet.values())
+    parts = (section.ft_sensor, *feet.values())
     of_sensor, *of_feet = (
-        texts.get(f"{PREFIX}{each.calibration}", "") for each in names
+        texts.get(f"{PREFIX}{part.calibration}", "") for part in parts
     )
     content: dict[str, Any] = {
         "zero": zero,
@@ -69,11 +69,11 @@ def present_inputs(
         content["sensor"] = [
             "" if _is_unknown(sensor, name) else sensor[name] for name in _SENSOR
         ]
-    return {name: _digest(each) for name, each in content.items()}
+    return {name: _digest(part) for name, part in content.items()}
 
 
 def inputs_of(step: StepId, present: Mapping[str, str]) -> dict[str, str]:
-    """Return of the present digests those that a step stands on."""
+    """Return the present digests of the inputs of a step."""
     return {name: present[name] for name in bases_of(step) if name in present}
 
 
@@ -84,7 +84,7 @@ def _properties(
 
 
 def _is_unknown(sensor: Mapping[str, str], name: str) -> bool:
-    """Return whether a sensor does not tell this of itself, or not every time."""
+    """Return whether a sensor does not report a property, or not always."""
     return sensor.get(name, "unknown").startswith("unknown")
 
 

@@ -1,7 +1,7 @@
-"""The steps of a commissioning in their order, and what makes which of them stale.
+"""The steps of a commissioning in their order, and the inputs that make them stale.
 
-Each step proves what later ones use, with the least energy. A step that was passed is
-repeated only where something it stands on has changed.
+Each step verifies what later ones rely on, with the least energy. A passed step is
+repeated only if one of its inputs has changed.
 """
 
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from enum import StrEnum
 
 
 class StepId(StrEnum):
-    """A step by its number; in the order in which they are done."""
+    """A step by its number, in order of execution."""
 
     CONFIGURATION = "C0"
     LISTEN = "C1"
@@ -29,12 +29,12 @@ class StepId(StrEnum):
 
     @property
     def words(self) -> str:
-        """What it looks at, in words."""
+        """Name of the step as words."""
         return self.name.replace("_", " ").lower()
 
 
 ORDER = tuple(StepId)
-# Without these no torque is sent to a real arm.
+# Steps required before torque is sent to a real arm.
 GATED = ORDER[: ORDER.index(StepId.GRAVITY_RAMP) + 1]
 
 
@@ -44,13 +44,13 @@ def _from(first: StepId, last: StepId = StepId.PLATE) -> tuple[StepId, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Basis:
-    """Something that steps stand on.
+    """An input of steps.
 
     Attributes:
-        words: what it is.
-        steps: those that are stale when it has changed.
-        may_be_untold: a device tells it not every time: a step that was done without it
-            contradicts nothing.
+        words: description.
+        steps: steps that a change makes stale.
+        may_be_untold: whether a device does not always report it: a step recorded
+            without it is no contradiction.
     """
 
     words: str
@@ -111,10 +111,10 @@ BASES: dict[str, Basis] = {
         _from(_S.BY_HAND, _S.GRAVITY_RAMP),
     ),
 }
-TOLD = ("mounting", "cables")  # bases that only a person knows of
-LONGEST_DAYS = 30  # after which all steps are stale
+TOLD = ("mounting", "cables")  # bases that only a person can report
+LONGEST_DAYS = 30  # validity of a step
 
 
 def bases_of(step: StepId) -> list[str]:
-    """Return the names of what a step stands on."""
+    """Return the names of the inputs of a step."""
     return [name for name, basis in BASES.items() if step in basis.steps]

@@ -1,6 +1,6 @@
-"""commissioning.json: what each step measured, chained so that no line changes unseen.
+"""commissioning.json: results of the steps, chained so that any change shows.
 
-The chain is evidence, not protection: who can write the file can write a whole new one.
+The chain is evidence, not protection: whoever can write the file can rewrite it all.
 """
 
 import hashlib
@@ -20,31 +20,31 @@ from experiments.commissioning.evidence.order import ORDER, StepId
 
 NAME = "commissioning.json"
 _LARGEST = 4_000_000  # bytes
-_FIRST = "0" * 64  # what the first step is chained to
+_FIRST = "0" * 64  # digest before the first step
 _ANEW = "Put back the file as it was written, or do it again: traction commission."
 
 Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Word = Annotated[str, Field(max_length=400)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
-Moment = Annotated[datetime, Field(strict=False)]  # in a table it is read from a text
+Moment = Annotated[datetime, Field(strict=False)]  # parsed from text
 Verdict = Literal["sound", "wrong"]
 
 
 class RecordPart(BaseModel):
-    """A part of a record: nothing else may stand in it, and it does not change."""
+    """A part of a record: immutable, without unknown fields."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class Measured(RecordPart):
-    """One quantity of a step beside its limits.
+    """One quantity of a step with its limits.
 
     Attributes:
-        name: what was measured.
-        value: of it, in `unit`.
-        unit: "" = a number of something.
-        low: the least that passes; None = no such limit.
-        high: the most that passes; None = no such limit.
+        name: name of the quantity.
+        value: value in `unit`.
+        unit: unit; "" = a count.
+        low: lower limit; None = no such limit.
+        high: upper limit; None = no such limit.
     """
 
     name: Word
@@ -55,14 +55,14 @@ class Measured(RecordPart):
 
     @property
     def is_within(self) -> bool:
-        """Whether it passes."""
+        """Whether the value is within its limits."""
         return (self.low is None or self.value >= self.low) and (
             self.high is None or self.value <= self.high
         )
 
     @property
     def text(self) -> str:
-        """It in words, with the limit that it passed or did not."""
+        """The quantity as text, with its limits."""
         unit = f" {self.unit}" if self.unit else ""
         limits = [
             f"{word} {limit:g}"
@@ -74,11 +74,11 @@ class Measured(RecordPart):
 
 
 class Raw(RecordPart):
-    """A recording that a step was judged by.
+    """The recording that a step was judged by.
 
     Attributes:
-        file: its name beside commissioning.json.
-        sha256: of its bytes.
+        file: file name, in the folder of commissioning.json.
+        sha256: checksum of the file.
     """
 
     file: Annotated[str, Field(pattern=r"^[\w-][\w.-]{0,99}$")]
@@ -86,21 +86,21 @@ class Raw(RecordPart):
 
 
 class StepRecord(RecordPart):
-    """One step that was done.
+    """Record of one step.
 
     Attributes:
-        step: which.
-        subject: what of several it was done with, e.g. the terrain of a container; "" =
-            there is one only.
+        step: the step.
+        subject: one of several, e.g. the terrain of a container; "" = there is only
+            one.
         started: UTC.
         ended: UTC.
-        operator: who did it.
-        inputs: digests of what it stands on, by the names of `order.BASES`.
-        raw: what was recorded.
-        quantities: what came of it.
+        operator: name of the operator.
+        inputs: digests of its inputs, by the names of `order.BASES`.
+        raw: its recordings.
+        quantities: its results.
         verdict: "wrong" = a quantity is beyond its limits.
-        cause: the first contradiction, in words; "" = none.
-        digest: of all this and of the step before.
+        cause: the first contradiction; "" = none.
+        digest: digest of all this and of the previous step.
     """
 
     step: StepId
@@ -117,12 +117,12 @@ class StepRecord(RecordPart):
 
     @property
     def name(self) -> str:
-        """What was done, in words."""
+        """Name of the step with its subject."""
         of = f" of {self.subject}" if self.subject else ""
         return f"{self.step} {self.step.words}{of}"
 
     def chained(self, before: str) -> Self:
-        """Return it with the digest that follows the digest `before`."""
+        """Return the step with the digest that follows the digest `before`."""
         content = self.model_dump(mode="json", exclude={"digest"})
         text = json.dumps(content, sort_keys=True, separators=(",", ":"))
         digest = hashlib.sha256(f"{before}{text}".encode()).hexdigest()
@@ -130,14 +130,14 @@ class StepRecord(RecordPart):
 
 
 class Commissioning(RecordPart):
-    """All of it: every step once, in order, as it was done last; C13 of each terrain.
+    """The commissioning: the last record of every step, in order; C13 per terrain.
 
     Attributes:
-        version: of the file.
-        program: version that wrote it.
-        is_simulated: the arm is.
-        steps: what was done.
-        told: when a person last said of a basis of `order.BASES` that it changed, UTC.
+        version: version of the file format.
+        program: version of the program that wrote it.
+        is_simulated: whether the arm is simulated.
+        steps: records of the steps.
+        told: time [UTC] at which a person last reported a change of a basis, by name.
     """
 
     version: Literal["1.0"] = FORMAT
@@ -148,64 +148,66 @@ class Commissioning(RecordPart):
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
-        places = [_place(done) for done in self.steps]
-        if places != sorted(set(places)):
+        keys = [_sort_key(done) for done in self.steps]
+        if keys != sorted(set(keys)):
             raise ValueError("its steps are not in order, or one stands twice")
         return self
 
     def of(self, step: StepId, subject: str = "") -> StepRecord | None:
-        """Return what was done of a step; None = nothing.
+        """Return the last record of a step, or None.
 
         Args:
-            step: which.
-            subject: with what of several; "" = whatever was last.
+            step: the step.
+            subject: one of several; "" = any.
         """
-        found = [
+        records = [
             done
             for done in self.steps
             if done.step is step and subject in ("", done.subject)
         ]
-        return max(found, key=lambda done: done.ended, default=None)
+        return max(records, key=lambda done: done.ended, default=None)
 
     def with_step(self, done: StepRecord) -> Self:
-        """Return it with a step in its place; the chain is made anew."""
-        steps = [old for old in self.steps if _place(old) != _place(done)]
-        steps = sorted([*steps, done], key=_place)
+        """Return the commissioning with a step inserted or replaced, chained again."""
+        steps = [old for old in self.steps if _sort_key(old) != _sort_key(done)]
+        steps = sorted([*steps, done], key=_sort_key)
         chained = _chain(steps, self.told)
         return self.model_copy(update={"steps": chained})
 
     def with_told(self, name: str, when: datetime) -> Self:
-        """Return it with what a person says of a basis; the chain is made anew."""
+        """Return the commissioning with a reported change of a basis, chained again."""
         told = {**self.told, name: when}
         return self.model_copy(update={"told": told, "steps": _chain(self.steps, told)})
 
     def told_inputs(self) -> dict[str, str]:
-        """Return digests of what a person said, by the names of `order.BASES`."""
-        return {name: _first({name: when}) for name, when in self.told.items()}
+        """Digests of the reported changes, by the names of `order.BASES`."""
+        return {name: _initial_digest({name: when}) for name, when in self.told.items()}
 
     def first_broken(self) -> StepId | None:
-        """Return the first step whose digest is not that of what stands there."""
+        """Return the first step whose digest does not match its content, or None."""
         pairs = zip(self.steps, _chain(self.steps, self.told), strict=True)
-        return next((is_.step for is_, was in pairs if is_.digest != was.digest), None)
+        return next(
+            (s.step for s, expected in pairs if s.digest != expected.digest), None
+        )
 
 
-def _place(done: StepRecord) -> tuple[int, str]:
-    """Return what the steps of a record are ordered by."""
+def _sort_key(done: StepRecord) -> tuple[int, str]:
+    """Sort key of the steps of a record."""
     return ORDER.index(done.step), done.subject
 
 
 def _chain(
     steps: Iterable[StepRecord], told: Mapping[str, datetime]
 ) -> tuple[StepRecord, ...]:
-    before, chained = _first(told), list[StepRecord]()
+    before, chained = _initial_digest(told), list[StepRecord]()
     for done in steps:
         chained.append(done.chained(before))
         before = chained[-1].digest
     return tuple(chained)
 
 
-def _first(told: Mapping[str, datetime]) -> str:
-    """Return what the first step is chained to."""
+def _initial_digest(told: Mapping[str, datetime]) -> str:
+    """Digest that the first step is chained to."""
     if not told:
         return _FIRST
     text = json.dumps({name: told[name].isoformat() for name in sorted(told)})
@@ -213,28 +215,28 @@ def _first(told: Mapping[str, datetime]) -> str:
 
 
 def read_commissioning(folder: Path) -> Commissioning | None:
-    """Return what stands in `folder`; None = there is no such file.
+    """Read the commissioning in `folder`; None = there is no such file.
 
     Raises:
-        SettingsError: it cannot be read, is no such file, or was changed.
+        SettingsError: the file cannot be read, is invalid, or was changed.
     """
     path = folder / NAME
     try:
-        found = Commissioning.model_validate_json(read_regular(path, _LARGEST))
+        record = Commissioning.model_validate_json(read_regular(path, _LARGEST))
     except FileNotFoundError:
         return None
     except OSError as error:
         raise _unreadable(path, error.strerror or str(error)) from error
     except ValueError as error:
         raise _unreadable(path, first_problem(error)) from error
-    broken = found.first_broken()
+    broken = record.first_broken()
     if broken is not None:
         raise SettingsError(
             f"{path} was changed at or before {broken} {broken.words}: its digest is "
             "not that of what stands there.",
             hint=_ANEW,
         )
-    return found
+    return record
 
 
 def _unreadable(path: Path, why: str) -> SettingsError:
@@ -242,10 +244,10 @@ def _unreadable(path: Path, why: str) -> SettingsError:
 
 
 def write_commissioning(folder: Path, content: Commissioning) -> None:
-    """Write it whole, or leave the earlier one.
+    """Replace the commissioning atomically.
 
     Raises:
-        OSError: it cannot be written.
+        OSError: the file cannot be written.
     """
     text = json.dumps(content.model_dump(mode="json"), indent=1) + "\n"
     with open_directory(folder) as directory:
