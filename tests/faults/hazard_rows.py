@@ -92,7 +92,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "",
             (
                 _LOST + "test_a_late_reply_never_answers_the_next_question",
-                "tests/wam/driver/test_late_replies.py::test_replies_that_are_late_for_ever_are_found_or_missing",
+                "tests/wam/driver/test_late_replies.py::test_permanently_late_replies_are_detected_or_missing",
             ),
         ),
     },
@@ -179,7 +179,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "before the first torque",
             (
-                "tests/wam/driver/test_safety_limits.py::test_a_module_that_keeps_its_limit_is_driven_and_both_values_are_told",
+                "tests/wam/driver/test_safety_limits.py::test_a_module_that_keeps_its_limit_is_driven_with_both_values_reported",
             ),
         ),
         "implausible": (
@@ -189,7 +189,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "as lost; positions are asked for no more, and the module's heartbeat idles the arm",
             ("safety-silent", "safety-false-idle"),
             "",
-            (_POLLER + "test_a_mode_that_does_not_exist_is_no_answer",),
+            (_POLLER + "test_an_undefined_mode_is_not_a_reply",),
         ),
         "late": (
             "a stop is known late",
@@ -239,7 +239,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "one at the start: a warning, recorded, that monitor is left out; later: the word is counted and ignored, the mode counts",
             (),
             "none: the mode is asked for by itself",
-            (_POLLER + "test_a_word_that_makes_no_sense_is_counted_and_ignored",),
+            (_POLLER + "test_an_invalid_word_is_counted_and_ignored",),
         ),
         "late": (
             "torques against shorted windings",
@@ -248,7 +248,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "idle confirmed, zero torque",
             ("estop", "pendant-idle"),
             "",
-            (_ARM + "test_an_e_stop_is_known_within_four_incomplete_cycles",),
+            (_ARM + "test_an_e_stop_is_detected_within_a_few_incomplete_cycles",),
         ),
     },
     "F/T wrench": {
@@ -539,7 +539,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "as lost",
             ("bus-flooded",),
             "",
-            (_LOST + "test_a_bus_used_to_sixty_percent_by_others_costs_no_cycle",),
+            (_LOST + "test_heavy_foreign_bus_traffic_costs_no_cycle",),
         ),
         "drifting": (
             "errors grow",
@@ -777,8 +777,8 @@ ROWS: dict[str, dict[str, Fields]] = {
             "with mech_at_home: modulo a motor turn (joint 1: 0.15 rad). By torques that are 0.1 N m rms off: a standard deviation of 0.5 degrees at joint 2, 0.9 at joint 3, 4 at joints 4 and 5; joints 1, 6 and 7 do not show. The residual of 1 N is 13 degrees of the foot's weight",
             (
                 "tests/experiments/preflight/test_zero_check.py::test_five_degrees_in_any_joint_are_noticed_and_the_joint_is_named",
-                "tests/wam/model/test_zero_errors.py::test_six_degrees_at_upper_arm_are_refused_with_the_joint",
-                "tests/wam/model/test_zero_errors.py::test_a_wrong_zero_of_joints_1_6_and_7_does_not_show",
+                "tests/wam/model/test_zero_errors.py::test_a_large_zero_error_is_refused_with_its_joint",
+                "tests/wam/model/test_zero_errors.py::test_a_wrong_zero_of_joints_1_6_and_7_is_not_observable",
             ),
         ),
         "late": (
@@ -811,7 +811,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "1.2 times the friction at the largest share leaves no swing",
             (
-                "tests/wam/control/test_friction_compensation.py::test_a_motor_that_swings_as_no_hand_does_ends_it_for_good",
+                "tests/wam/control/test_friction_compensation.py::test_oscillation_too_fast_for_a_hand_disables_compensation",
                 "tests/fakes/world/test_compensated_float.py::test_an_overestimate_of_a_fifth_leaves_no_swing",
             ),
         ),
@@ -823,8 +823,8 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "no energy gained on any closed way at 1.2 times the friction",
             (
-                "tests/wam/control/test_friction_compensation.py::test_random_ways_never_gain_energy_at_a_fifth_too_much",
-                "tests/wam/control/test_friction_compensation.py::test_what_is_badly_known_is_compensated_less",
+                "tests/wam/control/test_friction_compensation.py::test_overcompensated_random_motion_never_gains_energy",
+                "tests/wam/control/test_friction_compensation.py::test_uncertain_friction_is_compensated_less",
             ),
         ),
         "implausible": (
@@ -906,7 +906,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "none",
             (
-                "tests/wam/calibration/test_gravity_file.py::test_the_tool_of_the_calibration_fits_and_another_does_not",
+                "tests/wam/calibration/test_gravity_file.py::test_only_the_calibrated_tool_is_accepted",
             ),
         ),
     },

@@ -37,27 +37,27 @@ def held():
     return hold
 
 
-def test_the_springs_are_half_as_stiff_as_those_that_follow_moves(held):
+def test_hold_springs_are_softer_than_those_of_a_move(held):
     assert held.spring(seen(np.full(7, 1e-3))) == pytest.approx(-1e-3 * SOFT)
     assert held.stiffness == pytest.approx(SOFT)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_no_spring_gives_more_than_a_person_may_bear(held, side):
+def test_no_spring_exceeds_the_torque_acceptable_to_a_person(held, side):
     assert held.spring(seen(side * FAR)) == pytest.approx(-side * MOST)
 
 
-def test_a_guided_arm_has_half_of_it(held):
+def test_a_guided_arm_has_a_reduced_spring_limit(held):
     assert held.torque(seen(FAR), is_guided=True) == pytest.approx(-0.5 * MOST)
 
 
-def test_the_dampers_brake_each_joint_as_its_weight_needs(held):
+def test_dampers_are_scaled_to_the_weight_of_each_joint(held):
     qd = np.full(7, 0.5)
     assert held.torque(seen(qd=qd)) == pytest.approx(-HEAVY * 0.5)
     assert held.torque(seen(qd=qd), is_guided=True) == pytest.approx(-GUIDED * 0.5)
 
 
-def test_the_reference_follows_a_joint_that_is_pushed_away(held):
+def test_the_reference_follows_a_pushed_joint(held):
     held.spring(seen(FAR))
     reach = MOST[:6] / SOFT[:6]
     here = FAR[:6] - reach  # where the springs are without load now
@@ -72,7 +72,7 @@ def test_an_extrapolated_position_drags_no_reference_along(held):
 @pytest.mark.parametrize(
     ("rate", "is_driven"), [(0.05, True), (0.051, False), (-0.2, True)]
 )
-def test_a_spring_drives_no_joint_faster_than_50_mrad_a_second(held, rate, is_driven):
+def test_a_spring_does_not_exceed_its_return_speed(held, rate, is_driven):
     """The joint is below its reference: the spring pushes up."""
     q = np.full(7, -1e-3)
     spring = held.spring(seen(q, np.full(7, rate)))[:6]
@@ -81,18 +81,18 @@ def test_a_spring_drives_no_joint_faster_than_50_mrad_a_second(held, rate, is_dr
         assert held.spring(seen(q))[:6] == pytest.approx(np.zeros(6))
 
 
-def test_a_spring_drives_no_joint_faster_downwards_either(held):
+def test_a_spring_does_not_exceed_its_return_speed_downwards(held):
     q = np.full(7, 1e-3)
     assert (held.spring(seen(q, np.full(7, -0.05)))[:6] < 0.0).all()
     assert held.spring(seen(q, np.full(7, -0.051)))[:6] == pytest.approx(np.zeros(6))
 
 
-def test_arms_that_are_held_stay_where_they_are_held(held):
+def test_held_arms_stay_in_place(held):
     held.begin(FAR)
     assert held.spring(seen(np.full(7, 1e-3))) == pytest.approx(-1e-3 * SOFT)
 
 
-def test_an_arm_that_was_released_is_held_where_it_is_then(held):
+def test_a_released_arm_is_held_at_its_new_pose(held):
     held.release()
     assert held.spring(seen(FAR)) == pytest.approx(ZERO)
     held.begin(FAR)

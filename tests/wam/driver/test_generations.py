@@ -51,7 +51,7 @@ def bench(generation):
     return bench
 
 
-def test_start_up_tells_the_firmware_and_the_constants(generation):
+def test_start_up_reports_firmware_and_constants(generation):
     info = Bench(*generation).arm.start()
     assert ({p.vers for p in info.pucks}, info.safety_vers) == (
         {generation[0]},
@@ -114,7 +114,7 @@ def test_positions_are_defined(generation):
 @pytest.mark.parametrize(
     ("vers", "ecmax"), [(65, 96), (124, 96), (125, 100), (131, 100), (132, 101)]
 )
-def test_a_property_that_moved_is_where_its_firmware_has_it(vers, ecmax):
+def test_a_property_is_read_at_the_number_of_its_firmware(vers, ecmax):
     rig = Rig(NetworkOptions(vers=(vers,) * 7))
     properties = PropertyClient(rig.link, rig.clock)
     answering = [n for n in (96, 100, 101) if properties.get(1, n) is not None]
@@ -167,7 +167,7 @@ def test_every_firmware_is_zeroed_driven_and_stopped(vers):
 
 
 @pytest.mark.parametrize("vers", ALL_WAYS)
-def test_every_safety_firmware_takes_limits_and_says_why_it_stops(vers):
+def test_every_safety_firmware_accepts_limits_and_reports_its_cause(vers):
     bench = Bench(200, vers)
     assert bench.arm.start().warnings == ()
     bench.rig.network.pendant("activate")
@@ -180,7 +180,7 @@ def test_every_safety_firmware_takes_limits_and_says_why_it_stops(vers):
 
 
 @pytest.mark.parametrize("vers", ALL_WAYS)
-def test_every_firmware_is_asked_how_it_feels(vers):
+def test_every_firmware_is_polled_for_telemetry(vers):
     bench = Bench(vers, vers)
     bench.arm.start()
     bench.rig.network.set_bus_voltage(41.0)
@@ -194,7 +194,7 @@ def test_every_firmware_is_asked_how_it_feels(vers):
 
 
 @pytest.mark.parametrize(("vers", "bytes_"), QUESTIONS.items())
-def test_questions_and_torques_have_the_bytes_of_their_firmware(vers, bytes_):
+def test_requests_and_torques_have_the_bytes_of_their_firmware(vers, bytes_):
     bench = Bench(vers, 200)
     bench.arm.start()
     bench.rig.sent.clear()
@@ -213,7 +213,7 @@ def test_questions_and_torques_have_the_bytes_of_their_firmware(vers, bytes_):
         (200, 0, "the safety module", 32),
     ],
 )
-def test_firmware_nobody_described_is_driven_as_the_nearest_with_a_warning(
+def test_undocumented_firmware_is_driven_as_the_nearest_with_a_warning(
     motor, safety, who, taken_as
 ):
     # What the newest and the oldest known do stands for what nobody knows.
@@ -227,7 +227,7 @@ def test_firmware_nobody_described_is_driven_as_the_nearest_with_a_warning(
 
 
 @pytest.mark.parametrize("vers", [0, 31, 32])
-def test_firmware_without_units_of_torque_is_refused(vers):
+def test_firmware_without_torque_units_is_refused(vers):
     bench = Bench(vers, 200)
     with pytest.raises(DeviceFaultError) as caught:
         bench.arm.start()
@@ -236,7 +236,7 @@ def test_firmware_without_units_of_torque_is_refused(vers):
 
 
 @pytest.mark.parametrize("other", [40, 50, 60])
-def test_pucks_that_one_frame_cannot_reach_together_are_refused(other):
+def test_pucks_that_cannot_share_a_torque_frame_are_refused(other):
     rig = Rig(NetworkOptions(vers=(200, 200, other, 200, 200, 200, 200)), HOME_COUNTS)
     with pytest.raises(DeviceFaultError) as caught:
         WamArm(rig.link, rig.clock).start()

@@ -43,26 +43,26 @@ def by_name(vector):
 
 
 @pytest.mark.parametrize("vector", VECTORS, ids=by_name)
-def test_counts_agree_with_the_vectors(wam, vector):
+def test_counts_agree_with_the_reference_vectors(wam, vector):
     counts = wam.counts(np.array(vector["q"]))
     for found, expected in zip(counts, vector["motor_counts_floor"], strict=True):
         assert expected is None or found == expected
 
 
 @pytest.mark.parametrize("vector", VECTORS, ids=by_name)
-def test_joints_come_back_from_exact_counts(wam, vector):
+def test_joints_are_recovered_from_exact_counts(wam, vector):
     q = wam.joints(vector["motor_counts"])
     # Far below the 27 microrad of one count.
     assert q == pytest.approx(vector["q"], abs=1e-9)
 
 
 @pytest.mark.parametrize("vector", VECTORS, ids=by_name)
-def test_gravity_in_puck_units_agrees_with_the_vectors(wam, vector):
+def test_gravity_in_puck_units_agrees_with_the_reference_vectors(wam, vector):
     units = wam.exact_units(np.array(vector["gravity"]))
     assert units == pytest.approx(vector["gravity_puck_units"], abs=1e-9)
 
 
-def test_one_count_of_floor_stays_below_a_count_in_the_joints(wam):
+def test_flooring_counts_costs_less_than_one_count_in_the_joints(wam):
     pose_a = next(v for v in VECTORS if v["name"] == "generic_a")
     q = wam.joints(wam.counts(np.array(pose_a["q"])))
     assert abs(q - np.array(pose_a["q"])).max() < 1.2e-4
@@ -103,16 +103,16 @@ def test_clipping_keeps_gravity_and_scales_the_rest(wam):
     assert beyond.tolist() == [False, True, False, False, False, False, False]
 
 
-def test_puck_7_is_cut_at_its_own_limit(wam):
+def test_puck_7_is_clipped_at_its_own_limit(wam):
     command = wam.command(np.array([0, 0, 0, 0, 0, 0, -5.0]), ZERO)
     assert command.units == [0, 0, 0, 0, 0, 0, 1600]
 
 
-def test_gravity_beyond_a_limit_leaves_nothing_for_the_rest():
+def test_gravity_beyond_a_limit_leaves_no_other_torque():
     assert keep_gravity([12.0, 3.0], [11.0, 1.0], [10.0, 10.0]) == [10.0, 1.0]
 
 
-def test_what_fits_is_not_touched():
+def test_torques_within_their_limits_are_unchanged():
     assert keep_gravity([5.0, -3.0], [4.0, 1.0], [10.0, 10.0]) == [5.0, -3.0]
 
 
@@ -127,7 +127,7 @@ def test_no_command_exceeds_a_limit(tau, gravity):
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_a_torque_that_is_no_number_is_refused(wam, bad):
+def test_a_torque_that_is_not_a_number_is_refused(wam, bad):
     with pytest.raises(DeviceFaultError, match="not numbers"):
         wam.command(np.full(7, bad), ZERO)
 
@@ -148,12 +148,12 @@ def test_the_driver_has_the_matrix_of_the_arm_model():
     ("j2mp", "cts"),
     [(np.eye(6), CTS), (np.zeros((7, 7)), CTS), (J2MP, CTS[:6]), (J2MP, (0,) * 7)],
 )
-def test_constants_that_make_no_transmission_are_refused(j2mp, cts):
+def test_invalid_transmission_constants_are_refused(j2mp, cts):
     with pytest.raises(SettingsError):
         Transmission(j2mp, cts, IPNM)
 
 
-def test_a_matrix_that_is_changed_afterwards_changes_no_transmission():
+def test_a_matrix_changed_afterwards_does_not_change_the_transmission():
     given = J2MP.copy()
     wam = Transmission(given, CTS, IPNM)
     given[:] = np.eye(7)
@@ -161,14 +161,14 @@ def test_a_matrix_that_is_changed_afterwards_changes_no_transmission():
 
 
 @pytest.mark.parametrize("least", [1, 2])
-def test_the_least_constants_of_a_transmission_are_one(least):
+def test_the_smallest_valid_constants_are_accepted(least):
     wam = Transmission(J2MP, (least, *CTS[1:]), (least, *IPNM[1:]))
     assert wam.exact_units(TAU)[0] == pytest.approx(-least * TAU[0] / 42.0)
     with pytest.raises(SettingsError):
         Transmission(J2MP, CTS, (0, *IPNM[1:]))
 
 
-def test_the_least_transmission_that_can_be_inverted_is_taken():
+def test_a_barely_invertible_transmission_is_accepted():
     assert Transmission(np.eye(7), CTS, IPNM).joints([4096] + [0] * 6)[
         0
     ] == pytest.approx(2 * np.pi)

@@ -46,13 +46,13 @@ def test_a_wrong_zero_is_recovered_with_its_sign(model, poses, joint, degrees):
 
 
 @pytest.mark.parametrize("joint", [1, 6, 7])
-def test_a_wrong_zero_of_joints_1_6_and_7_does_not_show(model, poses, joint):
+def test_a_wrong_zero_of_joints_1_6_and_7_is_not_observable(model, poses, joint):
     found = measured(model, poses, joint, 5.0)
     assert np.abs(np.degrees(found.errors)).max() < 0.3
     check_zeros(found)
 
 
-def test_how_well_a_zero_is_seen_is_said_and_true(model, poses):
+def test_the_stated_uncertainty_of_a_zero_is_correct(model, poses):
     every = [measured(model, poses, noise=NOISE, seed=seed) for seed in range(40)]
     spread = np.degrees(np.std([found.errors for found in every], axis=0))
     told = np.degrees(np.mean([found.deviations for found in every], axis=0))
@@ -67,7 +67,7 @@ def test_a_sound_arm_is_not_refused(model, poses, seed):
 
 @pytest.mark.parametrize("joint", [2, 3])
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_six_degrees_at_upper_arm_are_refused_with_the_joint(model, poses, joint, sign):
+def test_a_large_zero_error_is_refused_with_its_joint(model, poses, joint, sign):
     found = measured(model, poses, joint, 6.0 * sign, NOISE)
     with pytest.raises(SettingsError, match=f"Joint {joint} seems") as refused:
         check_zeros(found)
@@ -79,9 +79,7 @@ def test_six_degrees_at_upper_arm_are_refused_with_the_joint(model, poses, joint
     ("error", "deviation", "is_refused"),
     [(3.1, 0.1, True), (2.9, 0.1, False), (-3.1, 0.1, True), (6.0, 1.6, False)],
 )
-def test_what_is_refused_is_beyond_three_degrees_and_four_deviations(
-    error, deviation, is_refused
-):
+def test_a_refused_zero_error_is_large_and_significant(error, deviation, is_refused):
     errors = np.radians([0.0, error, 0.0, 0.0])
     found = ZeroErrors((2, 3, 4, 5), errors, np.full(4, np.radians(deviation)))
     if is_refused:
