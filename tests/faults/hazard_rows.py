@@ -37,7 +37,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "no torque is sent meanwhile; hold after 10 ms, idle after 50 ms",
             ("reply-lost", "reply-lost-10", "puck-silent", "puck-reboot"),
             "",
-            (_MATRIX, _GUARD + "test_silence_tells_how_long_and_which_motors"),
+            (_MATRIX, _GUARD + "test_silence_is_reported_with_duration_and_motors"),
         ),
         "stuck": (
             "the joint is pulled faster and faster while the arm moves by itself; in a trial speed and place are recorded wrongly",
@@ -134,7 +134,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             ("not-a-number", "torque-limit", "puck-changed", *_SAID, *_DISOBEYING),
             "",
             (
-                _GUARD + "test_what_is_no_number_ends_in_idle",
+                _GUARD + "test_a_quantity_that_is_not_a_number_ends_in_idle",
                 _CYCLE + "test_the_command_after_a_verdict_is_within_limits_too",
             ),
         ),
@@ -145,7 +145,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "hold after more than 10 late cycles in a second",
             ("stall-3-ms", "stall-20-ms", "bus-flooded"),
             "",
-            (_GUARD + "test_eleven_late_cycles_in_a_second_end_in_hold",),
+            (_GUARD + "test_late_cycles_beyond_the_limit_end_in_hold",),
         ),
     },
     "safety mode": {
@@ -156,7 +156,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "hold; idle asked for after 400 ms",
             ("safety-silent",),
             "",
-            (_GUARD + "test_the_age_of_the_modules_last_answer_is_told",),
+            (_GUARD + "test_the_age_of_the_modules_last_reply_is_reported",),
         ),
         "stuck": (
             "the module says ACTIVE for ever, or does not obey IDLE",
@@ -166,7 +166,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             ("safety-disobedient",),
             "",
             (
-                _CYCLE + "test_an_unconfirmed_idle_is_unknown_and_nothing_is_let_fall",
+                _CYCLE + "test_an_unconfirmed_idle_is_unknown_and_keeps_the_torque",
                 _ARM
                 + "test_an_arm_that_is_only_listened_to_is_braked_by_its_own_module",
             ),
@@ -209,7 +209,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "as at a stop, where the module reports one",
             ("estop",),
             "",
-            (_GUARD + "test_brakes_after_a_state_that_may_drive_are_a_stop",),
+            (_GUARD + "test_brakes_after_a_driving_state_are_a_stop",),
         ),
         "stuck": (
             "the stop stays pressed",
@@ -218,7 +218,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "refused, or the session ends",
             ("estop",),
             "",
-            (_CYCLE + "test_a_stop_is_told_before_the_arm_was_ever_active",),
+            (_CYCLE + "test_a_stop_is_reported_before_the_first_activation",),
         ),
         "drifting": (
             "idle is pressed between activation and the first cycle; activate is pressed before the program asks for it: torques are zero, the arm would fall",
@@ -227,10 +227,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "idle, the session ends",
             ("pendant-idle", "early-activation"),
             "",
-            (
-                _CYCLE
-                + "test_a_request_in_the_moment_of_the_pendants_idle_does_not_hide_it",
-            ),
+            (_CYCLE + "test_a_simultaneous_request_does_not_hide_idle_at_the_pendant",),
         ),
         "implausible": (
             "lamps contradict each other",
@@ -259,7 +256,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "hold, trial interrupted",
             ("ft-stale", "ft-unplugged"),
             "in a move contact is not noticed then",
-            (_CYCLE + "test_a_silent_sensor_stops_a_trial_after_20_ms",),
+            (_CYCLE + "test_a_silent_sensor_stops_a_trial_after_its_timeout",),
         ),
         "stuck": (
             "an old force is recorded as new",
@@ -290,7 +287,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "the sample is not used; saturation is told at the review",
             ("ft-garbled", "ft-not-a-number", "ft-saturated"),
             "",
-            (_CYCLE + "test_a_sample_the_device_does_not_vouch_for_is_not_used",),
+            (_CYCLE + "test_an_invalid_sample_is_not_used",),
         ),
         "late": (
             "force and speed of different moments",
@@ -353,7 +350,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "hold after more than 10 in a second",
             ("stall-3-ms", "stall-20-ms"),
             "",
-            (_LOOP + "test_a_cycle_that_is_half_a_millisecond_late_is_counted",),
+            (_LOOP + "test_a_cycle_late_by_the_limit_is_counted",),
         ),
     },
     "console heartbeat": {
@@ -366,8 +363,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "0.6 s to an arm that holds",
             (
                 _PROCESSES,
-                _SERVER
-                + "test_an_orphaned_arm_holds_at_once_and_brakes_after_a_second",
+                _SERVER + "test_an_orphaned_arm_holds_at_once_and_idles_later",
             ),
         ),
         "stuck": (
@@ -377,10 +373,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "hold; the bell rings every second after a minute",
             (),
             "0.5 s",
-            (
-                _SERVER
-                + "test_a_silent_console_makes_the_arm_hold_within_half_a_second",
-            ),
+            (_SERVER + "test_a_silent_console_makes_the_arm_hold_after_its_timeout",),
         ),
         "drifting": (
             "none: the beat has no value",
@@ -389,7 +382,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "none",
             (),
             "none",
-            (_SERVER + "test_a_beating_console_and_recorder_leave_the_arm_alone",),
+            (_SERVER + "test_heartbeats_of_console_and_recorder_cause_no_verdict",),
         ),
         "implausible": (
             "a command that was not given",
@@ -409,7 +402,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "hold",
             (),
             "0.5 s",
-            (_SERVER + "test_a_console_that_comes_back_is_believed",),
+            (_SERVER + "test_a_returning_console_is_accepted",),
         ),
     },
     "recorder": {
@@ -439,7 +432,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "no effect on the arm",
             (
-                "tests/acquisition/recording/test_recorder.py::test_what_the_ring_lost_is_in_the_result",
+                "tests/acquisition/recording/test_recorder.py::test_losses_of_the_ring_are_in_the_result",
             ),
         ),
         "implausible": (
@@ -461,7 +454,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "0.25 s of a trial",
             (
-                "tests/acquisition/recording/test_recorder.py::test_the_file_is_forced_to_the_disk_every_quarter_second",
+                "tests/acquisition/recording/test_recorder.py::test_the_file_is_synced_at_its_period",
             ),
         ),
     },
@@ -583,7 +576,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "the torque that moves a joint for certain, then idle",
             (
                 "tests/fakes/world/test_stopped_moves.py::test_a_hand_that_holds_the_arm_in_a_move_has_it_braked",
-                _CONTACT + "test_before_the_first_tare_nothing_is_known_of_the_load",
+                _CONTACT + "test_before_the_first_tare_the_load_is_unknown",
             ),
         ),
         "stuck": (
@@ -593,7 +586,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "the trial ends, the arm holds",
             (),
             "40 N more than before",
-            (_CONTACT + "test_a_force_that_grows_while_the_foot_stands_ends_a_trial",),
+            (_CONTACT + "test_a_force_that_grows_on_a_foot_at_rest_ends_a_trial",),
         ),
         "drifting": (
             "a move is stopped though nothing is met",
@@ -613,10 +606,8 @@ ROWS: dict[str, dict[str, Fields]] = {
             "",
             (
                 _MATRIX,
-                _CONTACT
-                + "test_what_an_arm_meets_in_its_own_move_makes_it_hold_after_ten_milliseconds",
-                _CONTACT
-                + "test_a_load_beyond_a_limit_is_a_fault_after_ten_milliseconds",
+                _CONTACT + "test_contact_in_a_move_makes_the_arm_hold",
+                _CONTACT + "test_a_load_beyond_a_limit_is_a_fault_after_its_duration",
             ),
         ),
         "late": (
@@ -626,7 +617,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "as implausible",
             (),
             "16 ms and a cycle, 5 mm at 0.3 m/s",
-            (_CONTACT + "test_a_blow_that_is_over_at_once_is_no_fault",),
+            (_CONTACT + "test_a_brief_blow_is_not_a_fault",),
         ),
     },
     "second command": {

@@ -169,7 +169,7 @@ def test_every_limit_trips_just_outside_and_not_just_inside(
 
 @pytest.mark.parametrize("joint", range(1, 8))
 @pytest.mark.parametrize("side", ["lower", "upper"])
-def test_a_joint_may_reach_its_limit_and_not_pass_it(joint, side):
+def test_a_joint_may_reach_but_not_pass_its_limit(joint, side):
     limit = float(getattr(LIMITS, f"q_{side}")[joint - 1])
     beyond = limit + (E if side == "upper" else -E)
     assert judge(q=at(joint, limit)).action is Action.NONE
@@ -201,13 +201,13 @@ def test_a_quiet_cycle_passes():
 @pytest.mark.parametrize("field", ["q", "qd", "tau"])
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("joint", [1, 7])
-def test_what_is_no_number_ends_in_idle(field, value, joint):
+def test_a_quantity_that_is_not_a_number_ends_in_idle(field, value, joint):
     verdict = judge(**{field: at(joint, value)})
     assert (verdict.fault, verdict.action) == (Fault.NOT_A_NUMBER, Action.IDLE)
 
 
 @pytest.mark.parametrize("field", ["foot_speed", "joint7_offset"])
-def test_a_speed_or_offset_that_is_no_number_ends_in_idle(field):
+def test_a_speed_or_offset_that_is_not_a_number_ends_in_idle(field):
     assert judge(**{field: float("nan")}).fault == Fault.NOT_A_NUMBER
 
 
@@ -237,7 +237,7 @@ PAIRS = [
 
 
 @pytest.mark.parametrize(("worse", "milder"), PAIRS)
-def test_of_two_faults_the_more_severe_is_told(worse, milder):
+def test_the_more_severe_of_two_faults_is_reported(worse, milder):
     assert judge(**(FAULTS[milder] | FAULTS[worse])).fault == worse
 
 
@@ -260,7 +260,7 @@ def test_an_arm_that_is_not_powered_is_left_alone(name):
 
 
 @pytest.mark.parametrize("name", [Fault.JOINT7_SLIP, Fault.FT_STALE])
-def test_what_only_ends_a_trial_needs_a_trial(name):
+def test_trial_faults_need_a_trial(name):
     assert judge(**FAULTS[name], is_recording=False).action is Action.NONE
 
 
@@ -283,7 +283,7 @@ def test_home_on_the_stops_is_no_fault():
 @pytest.mark.parametrize(
     ("value", "is_armed"), [(-1.9, False), (-1.9 + E, True), (1.9, False)]
 )
-def test_a_position_limit_is_armed_a_tenth_of_a_radian_inside(value, is_armed):
+def test_a_position_limit_is_armed_inside_its_margin(value, is_armed):
     state, _ = check(LIMITS, GuardState(), seen(q=at(2, value)))
     assert bool(state.armed & 0b10) is is_armed
 
@@ -322,24 +322,24 @@ def late_cycles(times, state=ARMED):
     return state, verdict
 
 
-def test_ten_late_cycles_in_a_second_are_tolerated():
+def test_late_cycles_up_to_the_limit_are_tolerated():
     assert late_cycles(range(0, 100 * MS, 10 * MS))[1].action is Action.NONE
 
 
-def test_eleven_late_cycles_in_a_second_end_in_hold():
+def test_late_cycles_beyond_the_limit_end_in_hold():
     _, verdict = late_cycles(range(0, 110 * MS, 10 * MS))
     assert (verdict.fault, verdict.action) == (Fault.LOOP_LATE, Action.HOLD)
     assert verdict.detail == LateCycles(11, 10)
 
 
-def test_late_cycles_are_forgotten_after_a_second():
+def test_late_cycles_are_forgotten_after_the_window():
     times = [*range(0, 100 * MS, 10 * MS), S + 1]
     assert late_cycles(times)[1].action is Action.NONE
     times = [*range(0, 100 * MS, 10 * MS), S]
     assert late_cycles(times)[1].fault == Fault.LOOP_LATE
 
 
-def test_a_late_cycle_counts_for_a_second_to_the_nanosecond():
+def test_a_late_cycle_counts_for_exactly_the_window():
     """The oldest is forgotten, the next one is a second old."""
     times = [*range(0, 110 * MS, 10 * MS), S + 10 * MS]
     assert late_cycles(times)[1].detail == LateCycles(11, 10)
@@ -348,7 +348,7 @@ def test_a_late_cycle_counts_for_a_second_to_the_nanosecond():
 
 
 @pytest.mark.parametrize(("last_ms", "action"), [(149, "none"), (150, "idle")])
-def test_an_arm_is_idled_when_no_cycle_was_in_time_for_long(last_ms, action):
+def test_an_arm_is_idled_after_a_long_run_of_late_cycles(last_ms, action):
     state = ARMED
     for t_ns in (S, S + 75 * MS, S + last_ms * MS):
         state, verdict = check(LIMITS, state, seen(is_late=True, host_ns=t_ns))
@@ -356,7 +356,7 @@ def test_an_arm_is_idled_when_no_cycle_was_in_time_for_long(last_ms, action):
 
 
 @pytest.mark.parametrize(("skipped", "action"), [(99, "none"), (100, "idle")])
-def test_an_arm_whose_loop_stood_still_is_idled(skipped, action):
+def test_an_arm_whose_loop_stalled_is_idled(skipped, action):
     verdict = judge(is_late=True, skipped=skipped)
     assert verdict.action is Action(action)
 
@@ -381,7 +381,7 @@ def test_the_memory_of_late_cycles_does_not_grow():
     assert state.late == ()
 
 
-def test_a_cycle_that_brings_nothing_new_makes_no_new_state():
+def test_a_cycle_without_new_data_keeps_the_state_object():
     state, _ = late_cycles([0])
     assert check(LIMITS, state, seen(host_ns=500 * MS))[0] is state
 
@@ -398,20 +398,20 @@ def led(steps, **changes):
 ONE_MOTOR = replace(LIMITS, still_travel=(9.0, 9.0, 9.0, 0.02, 9.0, 9.0, 9.0))
 
 
-def test_a_motor_that_stands_still_while_the_sole_goes_on_ends_the_session():
+def test_a_stuck_motor_while_the_sole_moves_ends_the_session():
     _, verdict = led([(100, 0.3), (100, 0.3201)])
     assert (verdict.fault, verdict.action) == (Fault.MOTOR_STILL, Action.IDLE)
     assert verdict.detail == StillMotor(4, pytest.approx(20.1), pytest.approx(20.0))
     assert verdict.ends_session
 
 
-def test_the_sole_may_go_as_far_as_the_limit():
+def test_the_sole_may_travel_up_to_the_limit():
     assert led([(100, 0.0), (100, 0.02)])[1] is OK
     assert led([(100, 0.0), (100, -0.02)])[1] is OK
 
 
 @pytest.mark.parametrize("motor", range(1, 8))
-def test_motors_2_to_6_may_stand_for_six_centimetres_each(motor):
+def test_leading_motors_may_stand_for_their_limit_of_travel(motor):
     """Motors 1 and 7 are judged never."""
     verdicts: list[Any] = []
     for way in (0.06, 0.061):
@@ -431,33 +431,33 @@ def test_motors_2_to_6_may_stand_for_six_centimetres_each(motor):
 
 
 @pytest.mark.parametrize("counts", [99, 101])
-def test_a_flicker_of_one_count_is_no_motion(counts):
+def test_a_flicker_of_one_count_is_not_motion(counts):
     assert led([(100, 0.3), (counts, 0.31), (100, 0.3201)])[1].fault is not None
 
 
 @pytest.mark.parametrize("counts", [98, 102])
-def test_a_motor_that_turns_meanwhile_stands_not_still(counts):
+def test_a_motor_that_turns_meanwhile_is_not_stuck(counts):
     steps = [(100, 0.3), (counts, 0.319), (counts, 0.3389)]
     assert led(steps)[1] is OK
     assert led([*steps, (counts, 0.3391)])[1].fault is Fault.MOTOR_STILL
 
 
-def test_a_sole_that_stands_or_comes_back_judges_no_motor():
+def test_a_sole_at_rest_or_returning_flags_no_motor():
     assert led([(100, 0.3), (100, 0.3199), (100, 0.3), (100, 0.2801)])[1] is OK
 
 
-def test_a_motor_that_is_not_heard_is_not_said_to_stand_still():
+def test_a_silent_motor_is_not_reported_as_stuck():
     quiet = {"fresh": 0x77, "is_complete": False, "missing_cycles": 1}
     assert led([(100, 0.3), (100, 0.33)], **quiet)[1] is OK
 
 
-def test_between_trials_no_motor_is_said_to_stand_still():
+def test_no_motor_is_reported_as_stuck_between_trials():
     state, verdict = led([(100, 0.3), (100, 0.4)], is_recording=False)
     assert verdict is OK
     assert state.rests == ()
 
 
-def test_a_motor_at_rest_makes_no_new_state():
+def test_a_motor_at_rest_keeps_the_state_object():
     state, _ = led([(100, 0.3)])
     again = seen(counts=[0, 0, 0, 100, 0, 0, 0], sole=(0.31, 0.0, 0.0))
     assert check(ONE_MOTOR, state, again)[0] is state
@@ -480,14 +480,14 @@ def test_motors_1_and_7_may_stand_for_a_whole_trial():
 
 
 @pytest.mark.parametrize("motor", [1, 7])
-def test_a_move_that_turns_a_motor_in_vain_is_braked(motor):
+def test_a_move_with_a_stuck_motor_is_braked(motor):
     verdict = judge(stuck_motor=motor, is_recording=False)
     assert (verdict.fault, verdict.action) == (Fault.MOTOR_STUCK, Action.IDLE)
     assert verdict.detail == StuckMotor(motor)
     assert verdict.ends_session
 
 
-def test_silence_tells_how_long_and_which_motors():
+def test_silence_is_reported_with_duration_and_motors():
     assert judge(**missing(5)).detail == ReplySilence(10.0, 0b0100000)
     assert judge(**missing(25)).detail == ReplySilence(50.0, 0b0100000)
 
@@ -501,7 +501,7 @@ def test_details_are_in_the_units_of_the_message():
     assert slipped.detail.limit == pytest.approx(50.0)
 
 
-def test_severity_counts_what_is_taken_from_the_arm():
+def test_severity_orders_actions_by_what_they_take_from_the_arm():
     assert {action: GuardVerdict(action).severity for action in Action} == {
         Action.NONE: 0,
         Action.END_TRIAL: 1,
@@ -511,7 +511,7 @@ def test_severity_counts_what_is_taken_from_the_arm():
     }
 
 
-def test_the_age_of_the_modules_last_answer_is_told():
+def test_the_age_of_the_modules_last_reply_is_reported():
     verdict = judge(safety=SafetyMode.UNKNOWN, safety_age_ns=250 * MS)
     assert verdict.detail == SafetySilence(250.0)
     assert verdict.ends_session
@@ -536,7 +536,7 @@ def after(*modes, is_commanded=True, **last):
 ACTIVE, BRAKED, UNKNOWN = SafetyMode.ACTIVE, SafetyMode.IDLE, SafetyMode.UNKNOWN
 
 
-def test_torques_made_ready_behind_confirmed_brakes_are_not_judged():
+def test_torques_prepared_behind_confirmed_brakes_are_not_judged():
     ready = {"is_starting": True, "is_recording": False}
     assert after(BRAKED, BRAKED, qd=at(1, 9.0), **ready) is OK
 
@@ -550,15 +550,15 @@ def test_an_arm_behind_brakes_is_neither_driven_nor_recorded(asked):
 
 
 @pytest.mark.parametrize("before", [ACTIVE, UNKNOWN])
-def test_brakes_after_a_state_that_may_drive_are_a_stop(before):
+def test_brakes_after_a_driving_state_are_a_stop(before):
     assert after(BRAKED, before, BRAKED).fault is Fault.PENDANT_IDLE
 
 
-def test_an_unknown_circuit_is_judged_from_the_first_command_on():
+def test_an_unknown_circuit_is_judged_from_the_first_command():
     assert after(UNKNOWN).fault is Fault.SAFETY_SILENT
 
 
-def test_a_new_begin_behind_confirmed_brakes_is_no_stop():
+def test_a_restart_behind_confirmed_brakes_is_not_a_stop():
     state = check(LIMITS, ARMED, seen(is_commanded=False))[0]
     starting = seen(safety=BRAKED, is_starting=True, is_recording=False)
     _, verdict = check(LIMITS, state, starting)
@@ -572,7 +572,7 @@ JUMP = PositionJump(motor=1, counts=990, speed=11.4)
     ("cycles", "action"),
     [(4, Action.NONE), (5, Action.HOLD), (24, Action.HOLD), (25, Action.IDLE)],
 )
-def test_positions_that_are_never_believed_are_a_fault_of_their_own(cycles, action):
+def test_permanently_rejected_positions_are_a_separate_fault(cycles, action):
     verdict = judge(**missing(cycles), jump=JUMP)
     assert verdict.action is action
     if action is not Action.NONE:
@@ -592,22 +592,22 @@ IDLE = {"is_commanded": False, "is_recording": False, "state": ArmState.IDLE}
 
 
 @pytest.mark.parametrize("before", [GuardState(), ARMED])
-def test_an_arm_that_nobody_asked_to_be_active_is_idled(before):
+def test_an_arm_activated_without_a_request_is_idled(before):
     verdict = check(LIMITS, before, seen(safety=SafetyMode.ACTIVE, **IDLE))[1]
     assert (verdict.fault, verdict.action) == (Fault.NOT_ASKED_ACTIVE, Action.IDLE)
 
 
 @pytest.mark.parametrize("safety", set(SafetyMode) - {SafetyMode.ACTIVE})
-def test_an_idle_arm_that_is_not_active_is_well(safety):
+def test_an_inactive_idle_arm_is_no_fault(safety):
     assert judge(safety=safety, **IDLE) is OK
 
 
-def test_an_arm_whose_idle_is_not_confirmed_is_not_idled_in_every_cycle():
+def test_an_unconfirmed_idle_is_not_repeated_in_every_cycle():
     unknown = {**IDLE, "state": ArmState.UNKNOWN}
     assert judge(safety=SafetyMode.ACTIVE, **unknown) is OK
 
 
-def test_another_master_is_told_before_the_arm_is_driven():
+def test_another_master_is_reported_before_the_arm_is_driven():
     verdict = judge(safety=SafetyMode.IDLE, foreign_id=0x404, **IDLE)
     assert verdict.fault is Fault.BUS_SHARED
 
@@ -619,7 +619,7 @@ def test_an_arm_that_runs_away_in_hold_is_idled():
     assert verdict.fault is Fault.HOLD_MOTION
 
 
-def test_a_braked_arm_begins_anew_when_it_gets_power():
+def test_a_braked_arm_restarts_its_limits_at_activation():
     moved = {"sole": (1.0, 0.0, 0.0), "state": ArmState.HOLD, "is_recording": False}
     state = check(LIMITS, ARMED, seen(state=ArmState.HOLD))[0]
     state = check(LIMITS, state, seen(safety=SafetyMode.IDLE, **moved))[0]

@@ -75,7 +75,7 @@ TABLE = [
 
 
 @pytest.mark.parametrize(("state", "at", "good", "bad", "fault"), TABLE)
-def test_each_limit_of_motion_counts_from_its_value_on(state, at, good, bad, fault):
+def test_each_limit_of_motion_trips_at_its_value(state, at, good, bad, fault):
     begin = motion(0, state)
     assert judge(begin, motion(at, state, **good)) is OK
     verdict = judge(begin, motion(at, state, **bad))
@@ -84,7 +84,7 @@ def test_each_limit_of_motion_counts_from_its_value_on(state, at, good, bad, fau
     assert verdict.ends_session
 
 
-def test_an_arm_may_come_into_hold_with_what_it_had():
+def test_an_arm_may_enter_hold_with_its_energy():
     come = motion(LATER, HOLD, energy=0.6, qd=fast(6, 3.0))
     begin = motion(0, FLOAT)
     assert judge(begin, come) is OK
@@ -93,7 +93,7 @@ def test_an_arm_may_come_into_hold_with_what_it_had():
     assert judge(begin, come, late).fault is Fault.HOLD_MOTION
 
 
-def test_a_damped_arm_may_have_half_of_what_it_came_with():
+def test_a_damped_arm_may_keep_part_of_its_energy():
     come = motion(LATER, DAMP, energy=1.0)
     begin = motion(0, FLOAT)
     half = motion(LATER + 60, DAMP, energy=0.51)
@@ -102,7 +102,7 @@ def test_a_damped_arm_may_have_half_of_what_it_came_with():
     assert judge(begin, come, more).fault is Fault.DAMP_MOTION
 
 
-def test_a_damped_arm_wins_no_energy_back():
+def test_a_damped_arm_may_not_regain_energy():
     begin = motion(0, FLOAT)
     come = motion(LATER, DAMP, energy=1.0)
     least = motion(LATER + 20, DAMP, energy=0.2)
@@ -120,7 +120,7 @@ def test_a_move_is_no_dragged_hold():
     assert verdict.fault is Fault.KINETIC_ENERGY
 
 
-def test_hold_counts_its_way_from_where_it_began():
+def test_hold_measures_travel_from_its_start():
     begin = motion(0, FLOAT)
     hold = motion(LATER, HOLD, sole=(0.3, 0.0, 0.0))
     assert judge(begin, hold, motion(LATER + 9, HOLD, sole=(0.45, 0.0, 0.0))) is OK
@@ -143,7 +143,7 @@ def test_each_limit_of_motion_has_its_time(state, at, seen):
     assert judge(motion(0, state), motion(at, state, **seen)) is OK
 
 
-def test_a_damped_arm_is_given_eight_milliseconds_before_it_may_win_no_energy():
+def test_a_damped_arm_has_a_grace_period_for_energy():
     come = [motion(0, FLOAT), motion(LATER, DAMP, energy=1.0)]
     least = motion(LATER + 4, DAMP, energy=0.2)
     again = {"energy": 0.46}
@@ -155,7 +155,7 @@ def test_a_damped_arm_is_given_eight_milliseconds_before_it_may_win_no_energy():
 
 @pytest.mark.parametrize("joint", range(1, 8))
 @pytest.mark.parametrize("way", [-1.0, 1.0])
-def test_joints_that_stood_when_power_came_are_judged_at_once(joint, way):
+def test_joints_at_rest_at_activation_are_judged_at_once(joint, way):
     """What comes into hold in motion is given 150 ms."""
     at_limit, beyond = (
         {"qd": fast(joint, way * (LIMITS.hold_speed[joint - 1] + more))}
@@ -170,23 +170,23 @@ def test_joints_that_stood_when_power_came_are_judged_at_once(joint, way):
     assert late.detail.quantity == f"the speed of joint {joint}"
 
 
-def test_an_arm_that_comes_into_hold_wins_no_more_than_what_holds_may_have():
+def test_an_arm_entering_hold_may_gain_only_the_energy_limit():
     come = [motion(0, FLOAT), motion(LATER, HOLD, energy=0.6)]
     won = judge(*come, motion(LATER + 148, HOLD, energy=0.96))
     assert (won.fault, won.detail.limit) == (Fault.HOLD_MOTION, pytest.approx(0.95))
 
 
-def test_power_that_came_long_ago_is_no_activation():
+def test_an_old_activation_has_no_grace():
     begin = motion(0, HOLD)
     again = motion(LATER, HOLD, foot_speed=0.5)
     assert judge(begin, again) is OK
 
 
-def test_joints_that_hold_are_as_slow_as_the_pages_say():
+def test_held_joints_are_limited_to_the_documented_speeds():
     assert LIMITS.hold_speed == (1.2, 1.2, 1.2, 1.4, 2.0, 2.0, 2.5)
 
 
-def test_energy_that_filtered_speeds_show_late_is_what_the_arm_came_with():
+def test_energy_delayed_by_the_velocity_filter_counts_as_initial():
     before = motion(LATER, ArmState.HOLD)
     early = [before, motion(LATER + 2, ArmState.DAMP, energy=0.10)]
     late = motion(LATER + 100, ArmState.DAMP, energy=0.12)

@@ -8,7 +8,7 @@ STEP = np.array(LIMITS) * ([0.1] * 6 + [0.3])
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_a_torque_ends_at_its_limit_ten_cycles_from_zero(sign):
+def test_a_torque_reaches_its_limit_at_the_slew_rate(sign):
     tau = np.zeros(7)
     for _ in range(9):
         tau = bounded_torque(sign * np.full(7, 99.0), tau, LIMITS)
@@ -18,13 +18,13 @@ def test_a_torque_ends_at_its_limit_ten_cycles_from_zero(sign):
     assert tau.tolist() == [sign * limit for limit in LIMITS]
 
 
-def test_a_small_change_passes_as_it_is():
+def test_a_small_change_passes_unchanged():
     last = np.array(LIMITS) / 2
     wanted = last - 0.9 * STEP
     assert bounded_torque(wanted, last, LIMITS).tolist() == wanted.tolist()
 
 
-def test_each_joint_is_held_back_alone():
+def test_each_joint_is_limited_separately():
     wanted = np.zeros(7)
     wanted[3] = 9.0
     assert bounded_torque(wanted, np.zeros(7), LIMITS).tolist() == [
@@ -38,7 +38,7 @@ def test_each_joint_is_held_back_alone():
     ]
 
 
-def test_what_is_no_number_stays_so_and_is_refused_by_the_driver():
+def test_nan_passes_through_and_is_refused_by_the_driver():
     wanted = np.zeros(7)
     wanted[2] = np.nan
     assert np.isnan(bounded_torque(wanted, np.zeros(7), LIMITS)[2])
@@ -49,7 +49,7 @@ def test_the_largest_change_of_every_joint_is_its_share_of_the_limit():
     assert given == pytest.approx(STEP)
 
 
-def test_a_change_just_beyond_the_step_is_held_back():
+def test_a_change_beyond_the_step_is_limited():
     for more in (1.5, 1.001):
         for sign in (1.0, -1.0):
             given = bounded_torque(sign * more * STEP, np.zeros(7), LIMITS)
@@ -58,6 +58,6 @@ def test_a_change_just_beyond_the_step_is_held_back():
 
 @pytest.mark.parametrize("joint", range(7))
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_torque_just_beyond_its_limit_is_cut_to_it(joint, sign):
+def test_a_torque_beyond_its_limit_is_clipped(joint, sign):
     most = sign * np.eye(7)[joint] * LIMITS
     assert bounded_torque(1.001 * most, most, LIMITS).tolist() == most.tolist()
