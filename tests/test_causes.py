@@ -67,25 +67,25 @@ CAUSES = {
     ("ft_sensor/calibration/fit.py", "has the opposite sign in the sensor"): (
         "the fitted mass is negative at the stated mounting",
         "ft_sensor/calibration/test_fit.py::"
-        "test_a_weight_of_the_other_sign_is_refused_when_the_mounting_is_stated",
+        "test_an_inverted_weight_is_refused_if_the_mounting_is_stated",
     ),
     ("ft_sensor/calibration/fit.py", "do not change with the orientation"): (
         "the fitted mass is not above zero",
-        "ft_sensor/calibration/test_fit.py::test_readings_of_no_weight_are_refused",
+        "ft_sensor/calibration/test_fit.py::test_readings_without_weight_are_refused",
     ),
     ("ft_sensor/calibration/fit.py", "too similar"): (
         "the condition number of the orientations",
-        "ft_sensor/calibration/test_fit.py::test_orientations_that_are_alike_are_refused",
+        "ft_sensor/calibration/test_fit.py::test_similar_orientations_are_refused",
     ),
     ("ft_sensor/serial_line/startup.py", "stands still"): (
         "device times of a whole check are equal",
         "ft_sensor/vendors/test_bota_sensor.py::"
-        "test_standing_device_clock_is_refused_at_the_start",
+        "test_a_stopped_device_clock_is_refused_at_start",
     ),
     ("ft_sensor/vendors/bota_device.py", "raw gauge data or absurd forces"): (
         "the status bit, or forces beyond the stated limits",
         "ft_sensor/vendors/test_bota_sensor.py::"
-        "test_matrix_that_stays_inactive_is_refused",
+        "test_a_matrix_that_stays_inactive_is_refused",
     ),
     ("analysis/data/inertia.py", "show no acceleration"): (
         "the median period of the samples against the window",

@@ -267,7 +267,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "a channel of a coarser sensor is told after the trial only",
             (
                 _MATRIX,
-                "tests/ft_sensor/vendors/test_sensor_contract.py::test_one_number_that_stands_still_is_invalid_until_it_moves",
+                "tests/ft_sensor/vendors/test_sensor_contract.py::test_one_frozen_reading_is_invalid_until_it_changes",
                 "tests/experiments/run/test_quality.py::test_a_frozen_channel_is_named_and_nothing_of_the_sensor_is_ticked",
             ),
         ),
@@ -278,7 +278,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "none on the arm: force commands nothing",
             ("ft-jump", "ft-reboot"),
             "0.5 N in a tare",
-            ("tests/ft_sensor/test_tare.py::test_touching_is_refused_in_numbers",),
+            ("tests/ft_sensor/test_tare.py::test_a_touch_is_refused_with_its_spread",),
         ),
         "implausible": (
             "no number, or beyond the range",
@@ -297,7 +297,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             ("ft-clock-jump", "stall-20-ms"),
             "",
             (
-                "tests/ft_sensor/serial_line/test_clock_fit.py::test_a_time_is_known_to_a_tenth_of_a_millisecond",
+                "tests/ft_sensor/serial_line/test_clock_fit.py::test_a_device_time_is_mapped_accurately",
             ),
         ),
     },
@@ -701,7 +701,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             ("ft-clock-jump",),
             "",
             (
-                "tests/ft_sensor/serial_line/test_clock_fit.py::test_two_clocks_never_run_further_apart_than_crystals_do",
+                "tests/ft_sensor/serial_line/test_clock_fit.py::test_clock_drift_is_bounded_by_crystal_tolerance",
             ),
         ),
         "implausible": (
@@ -723,7 +723,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "no effect on the arm",
             (
-                "tests/ft_sensor/serial_line/test_link.py::test_latency_timer_is_read_back",
+                "tests/ft_sensor/serial_line/test_link.py::test_the_latency_timer_is_read_back",
             ),
         ),
     },
