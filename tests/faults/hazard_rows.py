@@ -48,7 +48,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "measured in a move and while the sole stands. On an arm almost without friction (0.02) a wrist joint reaches 1.7 of its limit in other moves, with 0.3 of it 1.1. An encoder that freezes within the last 17 mrad of joint 7's way is noticed in the next move only. In a trial motor 7, frozen, lets the ground turn the foot: 2.1 of the limit",
             (
                 _MATRIX,
-                "tests/fakes/world/test_stopped_moves.py::test_a_motor_whose_encoder_freezes_in_a_move_is_noticed",
+                "tests/fakes/world/test_stopped_moves.py::test_an_encoder_that_freezes_in_a_move_is_detected",
                 "tests/faults/test_stuck_in_trials.py::test_a_frozen_motor_ends_a_trial_before_the_arm_is_fast",
                 "tests/faults/test_stuck_in_trials.py::test_a_frozen_motor_that_hardly_turns_in_a_trial_does_no_harm",
             ),
@@ -71,7 +71,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "a smaller step is not detected",
             (
                 _MATRIX,
-                "tests/fakes/world/test_false_positions.py::test_one_false_position_is_no_blow",
+                "tests/fakes/world/test_false_positions.py::test_one_rejected_position_gives_no_torque_step",
             ),
         ),
         "late": (
@@ -575,7 +575,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             ("ft-stale", "ft-unplugged"),
             "the torque that moves a joint for certain, then idle",
             (
-                "tests/fakes/world/test_stopped_moves.py::test_a_hand_that_holds_the_arm_in_a_move_has_it_braked",
+                "tests/fakes/world/test_stopped_moves.py::test_holding_the_arm_in_a_move_brakes_it",
                 _CONTACT + "test_before_the_first_tare_the_load_is_unknown",
             ),
         ),
@@ -803,7 +803,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "1.2 times the friction at the largest share leaves no swing",
             (
                 "tests/wam/control/test_friction_compensation.py::test_oscillation_too_fast_for_a_hand_disables_compensation",
-                "tests/fakes/world/test_compensated_float.py::test_an_overestimate_of_a_fifth_leaves_no_swing",
+                "tests/fakes/world/test_compensated_float.py::test_overestimated_friction_causes_no_oscillation",
             ),
         ),
         "drifting": (
@@ -839,7 +839,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "no swing with 4 ms more",
             (
-                "tests/fakes/world/test_compensated_float.py::test_an_overestimate_of_a_fifth_leaves_no_swing",
+                "tests/fakes/world/test_compensated_float.py::test_overestimated_friction_causes_no_oscillation",
             ),
         ),
     },
