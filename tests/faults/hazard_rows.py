@@ -1,7 +1,7 @@
 # ruff: noqa: E501 - a table that is read row by row
 """The rows of the table of hazards: (hazard, cause, detection, reaction, faults, bound, tests)."""
 
-_MATRIX = "tests/faults/test_matrix.py::test_a_fault_comes_to_what_the_table_says"
+_MATRIX = "tests/faults/test_matrix.py::test_a_fault_has_the_outcome_in_the_table"
 _GUARD = "tests/acquisition/control_loop/test_guard.py::"
 _CYCLE = "tests/acquisition/control_loop/test_cycle.py::"
 _LOOP = "tests/acquisition/control_loop/test_loop.py::"
@@ -11,7 +11,9 @@ _LOST = "tests/wam/driver/test_lost_replies.py::"
 _POLLER = "tests/wam/driver/test_status_poller.py::"
 _CONTACT = "tests/acquisition/control_loop/test_contact.py::"
 _LOCK = "tests/experiments/rig/test_arm_lock.py::"
-_PROCESSES = "tests/faults/test_process_faults.py::test_what_befalls_the_computer_leaves_the_arm_safe"
+_PROCESSES = (
+    "tests/faults/test_process_faults.py::test_computer_faults_leave_the_arm_safe"
+)
 _MOTORS = range(1, 8)
 _LIES = tuple(f"lie-of-motor-{motor}" for motor in _MOTORS)
 _CREEPS = tuple(f"creep-of-motor-{motor}" for motor in _MOTORS)
@@ -49,8 +51,8 @@ ROWS: dict[str, dict[str, Fields]] = {
             (
                 _MATRIX,
                 "tests/fakes/world/test_stopped_moves.py::test_an_encoder_that_freezes_in_a_move_is_detected",
-                "tests/faults/test_stuck_in_trials.py::test_a_frozen_motor_ends_a_trial_before_the_arm_is_fast",
-                "tests/faults/test_stuck_in_trials.py::test_a_frozen_motor_that_hardly_turns_in_a_trial_does_no_harm",
+                "tests/faults/test_stuck_in_trials.py::test_a_frozen_motor_ends_a_trial_at_low_speed",
+                "tests/faults/test_stuck_in_trials.py::test_a_frozen_motor_that_hardly_turns_is_harmless",
             ),
         ),
         "drifting": (
