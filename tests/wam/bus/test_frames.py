@@ -317,16 +317,16 @@ def test_the_safety_module_is_node_10():
     assert frames.SAFETY_NODE == 10
 
 
-@pytest.mark.parametrize("sender", [0, 1, 7, 8, 9, 10, 11, 20, 31])
 @pytest.mark.parametrize("to", [*range(1, 9), 10])
-def test_a_frame_to_a_device_is_from_a_host_whatever_its_sender_field(sender, to):
-    assert frames.is_of_host(frames.compose_id(sender, to, is_group=False))
+def test_a_frame_to_a_device_is_from_a_host_whatever_its_sender_field(to):
+    for sender in range(32):
+        assert frames.is_of_host(frames.compose_id(sender, to, is_group=False))
 
 
-@pytest.mark.parametrize("sender", [0, 1, 7, 8, 20, 31])
 @pytest.mark.parametrize("group", [0, 1, 2, 4, 5])
-def test_a_group_command_is_from_a_host_whatever_its_sender_field(sender, group):
-    assert frames.is_of_host(frames.compose_id(sender, group, is_group=True))
+def test_a_group_command_is_from_a_host_whatever_its_sender_field(group):
+    for sender in (0, 1, 7, 8, 20, 31):
+        assert frames.is_of_host(frames.compose_id(sender, group, is_group=True))
 
 
 @pytest.mark.parametrize("sender", [8, 9, 10, 20, 31])

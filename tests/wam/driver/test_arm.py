@@ -14,6 +14,7 @@ from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
 from wam.bus.frames import MOTOR_NODES, decode_torques
 from wam.driver.arm import WamArm
+from wam.driver.home import HOME_LIMIT
 from wam.driver.settings import ArmSettings
 
 HOME = np.array([0.0, -2.0, 0.0, 3.13, 0.0, 0.0, 0.0])
@@ -180,7 +181,7 @@ def test_a_reading_has_seven_joints_within_its_cycle():
     assert frames(rig)[0] == GET_P
 
 
-@pytest.mark.parametrize("silent", range(8))
+@pytest.mark.parametrize("silent", [0, 1, 4, 7])
 def test_a_reading_states_which_motors_answered_and_when(silent):
     rig, arm = started()
     first = cycle(rig, arm)
@@ -589,8 +590,10 @@ def test_another_master_is_reported_whatever_its_node(node):
     assert cycle(rig, arm, TAU).foreign_id == 0x401 | node << 5
 
 
-@pytest.mark.parametrize("joint", range(7))
-@pytest.mark.parametrize(("turned", "is_taken"), [(0.028, True), (0.032, False)])
+@pytest.mark.parametrize("joint", [0, 2, 5, 6])
+@pytest.mark.parametrize(
+    ("turned", "is_taken"), [(0.99 * HOME_LIMIT, True), (1.01 * HOME_LIMIT, False)]
+)
 def test_zeroing_a_moving_arm_is_refused_with_the_joint(joint, turned, is_taken):
     rig, arm = started(NetworkOptions(is_zeroed=False), counts=(500,) * 7)
     motors = arm.transmission.counts(np.eye(7)[joint] * turned)

@@ -53,8 +53,10 @@ def field_set(index, bits):
     return lambda word: word & ~(7 << 3 * index) | bits << 3 * index
 
 
-@pytest.mark.parametrize("bits", [0b000, 0b011, 0b101, 0b110, 0b111])
-@pytest.mark.parametrize("index", range(5))
+@pytest.mark.parametrize(
+    ("index", "bits"),
+    [*((i, 0b000) for i in range(5)), (0, 0b011), (1, 0b101), (3, 0b110), (4, 0b111)],
+)
 def test_an_ambiguous_monitor_is_named_and_the_arm_starts(index, bits):
     info = Bench(field_set(index, bits)).arm.start()
     assert info.pendant.unclear == (MONITORS[index],)

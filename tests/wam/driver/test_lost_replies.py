@@ -109,8 +109,10 @@ def test_a_doubled_reply_is_counted_and_changes_nothing(bench):
     assert bench.arm.counters.stale >= 4  # the last one may still be on the wire
 
 
-@pytest.mark.parametrize("node", MOTOR_NODES)
-@pytest.mark.parametrize("after_ns", [0, 50_000, 1_000_000])
+@pytest.mark.parametrize(
+    ("node", "after_ns"),
+    [*((node, 50_000) for node in MOTOR_NODES), (1, 0), (7, 1_000_000)],
+)
 def test_a_second_sender_is_detected_within_a_few_cycles(bench, node, after_ns):
     bench.faults.answer_twice(position_reply_id(node), lambda data: data, after_ns)
     found = [bench.cycle().doubled for _ in range(10)]
