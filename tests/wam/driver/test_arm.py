@@ -307,10 +307,13 @@ def test_waiting_for_a_missing_reply_ends_at_the_deadline():
     assert rig.clock.t_ns - begin_ns == 1_500_000
 
 
-@pytest.mark.parametrize(("jump", "is_fresh"), [(195, True), (210, False)])
-def test_a_position_beyond_the_plausible_speed_is_rejected(jump, is_fresh):
+@pytest.mark.parametrize(("share", "is_fresh"), [(0.99, True), (1.01, False)])
+def test_a_position_beyond_the_plausible_speed_is_rejected(share, is_fresh):
     rig, arm = started()
     cycle(rig, arm)
+    settings = ArmSettings()
+    fastest = arm.transmission.fastest_counts(np.array(settings.speed_limits))[2]
+    jump = round(share * (settings.jump_margin * fastest * CYCLE_NS * 1e-9 + 4))
     rig.motors.position[2] += jump
     reading = cycle(rig, arm)
     assert bool(reading.fresh & 0b100) is is_fresh

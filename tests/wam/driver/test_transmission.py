@@ -7,6 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import DeviceFaultError, SettingsError
+from wam.driver.puck_properties import shipped_table
+from wam.driver.safety_module import SafetyLimits
 from wam.driver.settings import ArmSettings
 from wam.driver.transmission import (
     HOST_TORQUE_LIMITS,
@@ -151,6 +153,12 @@ def test_the_driver_has_the_matrix_of_the_arm_model():
 def test_invalid_transmission_constants_are_refused(j2mp, cts):
     with pytest.raises(SettingsError):
         Transmission(j2mp, cts, IPNM)
+
+
+def test_host_torque_limits_are_those_of_the_cable_and_below_the_modules_warning():
+    cable = np.array(shipped_table().MT.values)
+    warning = 0.9 * SafetyLimits().words()["TL1"]
+    assert tuple(np.minimum(cable, int(warning)).tolist()) == HOST_TORQUE_LIMITS
 
 
 def test_a_matrix_changed_afterwards_does_not_change_the_transmission():
