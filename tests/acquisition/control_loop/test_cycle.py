@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.clock import PERIOD_NS
-from acquisition.control_loop.cycle import Cycle, CycleOutputs
+from acquisition.control_loop.cycle import CONTACT_FORCE, Cycle, CycleOutputs
 from acquisition.control_loop.details import MotionExcess
 from acquisition.control_loop.faults import (
     Action,
@@ -397,7 +397,9 @@ def test_saturation_is_flagged(bench):
     assert has(bench.run(force=None), Flag.FT_SATURATED)
 
 
-@pytest.mark.parametrize(("force", "touches"), [(0.5, False), (0.51, True)])
+@pytest.mark.parametrize(
+    ("force", "touches"), [(CONTACT_FORCE, False), (1.01 * CONTACT_FORCE, True)]
+)
 def test_contact_is_flagged(bench, force, touches):
     assert has(bench.run(force=force), Flag.CONTACT) is touches
 

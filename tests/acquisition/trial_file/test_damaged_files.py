@@ -113,7 +113,7 @@ def test_a_trial_without_cycles_is_reported_as_such(put):
         TrialReader(put(foreign("ros2"))).cycles()
 
 
-@pytest.mark.parametrize("share", np.linspace(0.0, 0.9999, 20))
+@pytest.mark.parametrize("share", np.linspace(0.0, 0.9999, 10))
 def test_a_truncated_file_is_refused(put, pristine, share):
     data = pristine[0]
     with pytest.raises(TrialFileError) as caught:
@@ -134,7 +134,7 @@ def test_a_file_that_lacks_its_last_bytes_is_refused(put, pristine, missing):
     [CHUNK, INDEX, ATTACHMENT, CHUNK_INDEX, STATISTICS, METADATA],
     ids=["chunk", "index", "attachment", "chunk-index", "statistics", "metadata"],
 )
-@pytest.mark.parametrize("bit", range(8))
+@pytest.mark.parametrize("bit", [0, 7])
 def test_a_flipped_bit_is_detected(put, pristine, opcode, bit):
     data = pristine[0]
     span = span_of(data, opcode)
