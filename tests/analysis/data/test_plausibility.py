@@ -11,7 +11,7 @@ from analysis.data.load import load_trial
 from analysis.data.plausibility import doubt_summary, doubts_of, doubts_of_record
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import TractionSeries
-from analysis.data.tare_bracket import TareBracket
+from analysis.data.tare_bracket import LARGEST_CHANGE, TareBracket
 
 RECORDED = Path(__file__).parents[2] / "data" / "recorded" / "session-1.0.tar.xz"
 TIME, SPEED, LOAD, ALONG = range(4)
@@ -158,10 +158,10 @@ def test_an_unloaded_foot_with_a_frozen_channel_is_doubted(recorded):
     assert kinds(found) == {"frozen"}
 
 
-@pytest.mark.parametrize(("moved", "is_doubted"), [(1.9, False), (2.1, True)])
-def test_a_zero_that_moved_around_a_trial_is_doubted(recorded, moved, is_doubted):
+@pytest.mark.parametrize(("share", "is_doubted"), [(0.99, False), (1.01, True)])
+def test_a_zero_that_moved_around_a_trial_is_doubted(recorded, share, is_doubted):
     biases = np.zeros((2, 6))
-    biases[1, :2] = moved / np.sqrt(2.0)
+    biases[1, :2] = share * LARGEST_CHANGE / np.sqrt(2.0)
     about = replace(recorded, bracket=TareBracket((-2.0, 8.0), biases))
     assert ("zero" in kinds(about)) is is_doubted
 

@@ -5,6 +5,8 @@ from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
 from analysis.data.prepare import (
+    MINIMUM_KEPT,
+    MINIMUM_TRAVEL_SHARE,
     CoverageShares,
     PrepareOptions,
     foot_velocity,
@@ -82,13 +84,22 @@ def test_travel_is_the_integral_of_velocity(make_series):
 
 
 @pytest.mark.parametrize(
-    ("samples", "container", "is_countable"),
-    [(1250, None, True), (1245, None, False), (2000, 0.44, True), (2000, 0.45, False)],
+    ("kept", "share", "is_countable"),
+    [
+        *((MINIMUM_KEPT, None, True), (MINIMUM_KEPT - 1, None, False)),
+        *((2 * MINIMUM_KEPT, 1.01, True), (2 * MINIMUM_KEPT, 0.99, False)),
+    ],
 )
 def test_a_trial_needs_enough_samples_and_travel(
-    make_series, samples, container, is_countable
+    make_series, kept, share, is_countable
 ):
-    options = PrepareOptions(container_travel=container)
+    """`share`: travel relative to the least that the container demands."""
+    options = PrepareOptions()
+    samples = kept * options.downsample
+    least = 0.1 * samples * 0.002  # m at 0.1 m/s and 500 Hz
+    if share is not None:
+        container = least / MINIMUM_TRAVEL_SHARE / share
+        options = PrepareOptions(container_travel=container)
     trial = prepare_trial(make_series(np.full(samples, 0.1)), options)
     assert trial.is_countable is is_countable
 
@@ -96,8 +107,8 @@ def test_a_trial_needs_enough_samples_and_travel(
 def test_travel_of_exactly_the_required_share_is_enough(make_series):
     series = make_series(np.full(2000, 0.1))
     way = prepare_trial(series, PrepareOptions()).travel
-    near = way / 0.9
-    container = next(c for c in np.nextafter(near, [near, 0, 1]) if 0.9 * c == way)
+    near, share = way / MINIMUM_TRAVEL_SHARE, MINIMUM_TRAVEL_SHARE
+    container = next(c for c in np.nextafter(near, [near, 0, 1]) if share * c == way)
     for wanted, is_countable in ((container, True), (container * (1 + 1e-9), False)):
         options = PrepareOptions(container_travel=float(wanted))
         assert prepare_trial(series, options).is_countable is is_countable

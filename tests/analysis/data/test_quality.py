@@ -1,7 +1,13 @@
 import numpy as np
 import pytest
 
-from analysis.data.quality import CoverageGrid, coverage, quick_ratio, thinnest
+from analysis.data.quality import (
+    ENOUGH,
+    CoverageGrid,
+    coverage,
+    quick_ratio,
+    thinnest,
+)
 
 
 class Trial:
@@ -31,7 +37,10 @@ def test_the_thinnest_reachable_cell_is_named():
     assert thinnest(CoverageGrid(counts)) == "slower than 0.05 m/s, above 5 N"
 
 
-@pytest.mark.parametrize(("held", "is_thin"), [(19, True), (20, False)])
+FEW = round(1000 * ENOUGH)  # of a thousand samples
+
+
+@pytest.mark.parametrize(("held", "is_thin"), [(FEW - 1, True), (FEW, False)])
 def test_a_cell_below_its_share_of_samples_is_thin(held, is_thin):
     counts = np.zeros((4, 4), int)
     for cell in ((1, 1), (2, 1), (2, 2), (0, 1), (0, 2)):

@@ -3,7 +3,7 @@ import pytest
 
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import TractionSeries
-from analysis.study.pushes import FootPush, PushTable, find_pushes
+from analysis.study.pushes import V_SLIP, FootPush, PushTable, find_pushes
 from tests.analysis.study.pushed import DT, RUNNING, one_push
 
 
@@ -30,10 +30,10 @@ def test_a_push_released_before_slipping_is_censored_at_its_peak():
     assert push.is_held
 
 
-@pytest.mark.parametrize(("speed", "is_held"), [(0.059, True), (0.061, False)])
-def test_motion_above_v_slip_is_a_slip(speed, is_held):
+@pytest.mark.parametrize(("share", "is_held"), [(0.99, True), (1.01, False)])
+def test_motion_above_v_slip_is_a_slip(share, is_held):
     F_t, v_t = one_push(9.0, 20.0)
-    (push,) = find_pushes(trial(F_t, v_t * speed / RUNNING))
+    (push,) = find_pushes(trial(F_t, v_t * share * V_SLIP / RUNNING))
     assert push.is_held is is_held
 
 
@@ -58,7 +58,7 @@ def test_a_maximum_needs_a_relative_prominence(depth, count):
 
 def test_the_spike_of_resticking_is_not_a_push():
     F_t, v_t = one_push(9.0, 20.0)
-    end = int(np.flatnonzero(v_t > 0.06)[-1])
+    end = int(np.flatnonzero(v_t > V_SLIP)[-1])
     spike = np.interp(np.arange(len(F_t)) - end, [0, 20, 40], [0, 5.0, 0.0])
     assert len(find_pushes(trial(F_t + spike, v_t))) == 1
     late = np.interp(np.arange(len(F_t)) - end, [60, 80, 100], [0, 5.0, 0.0])
