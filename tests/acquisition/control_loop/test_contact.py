@@ -188,7 +188,7 @@ def test_a_force_on_a_moving_foot_is_not_growth(cycles):
         assert verdict is OK
 
 
-def test_a_recovering_force_counts_after_its_settling_time():
+def test_a_dip_of_the_force_delays_its_growth():
     """Of ten points, the ninth or the last is of a moment with less force."""
     early = steps(10.0, *[60.0] * 7, 30.0, *[60.0] * 5)
     verdict, cycle = follow(early)

@@ -708,7 +708,7 @@ def test_a_start_overtaken_by_a_verdict_sends_no_torque(bench):
     assert (bench.state, bench.reason) == (ArmState.IDLE, "arm-not-active")
 
 
-def test_an_idled_powered_test_stays_idle_at_the_session_end():
+def test_an_idling_verdict_stays_latched_after_a_later_one():
     status = ControlStatus()
     status.latch(replace(fault("console-silent"), action=Action.IDLE))
     status.latch(fault("can-silence"))

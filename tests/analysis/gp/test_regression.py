@@ -282,7 +282,7 @@ def test_an_input_that_does_not_vary_is_carried_along():
 @pytest.mark.parametrize(
     ("y", "reason"), [(np.zeros(50), "50 samples"), (np.arange(19.0), "19 samples")]
 )
-def test_constant_outputs_are_refused(y, reason):
+def test_uninformative_outputs_are_refused(y, reason):
     with pytest.raises(SettingsError, match=reason):
         fit_gp(np.random.default_rng(0).normal(size=(y.size, 2)), y)
 

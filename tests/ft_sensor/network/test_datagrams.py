@@ -98,7 +98,7 @@ def test_an_invalid_address_is_refused(text):
 
 
 @pytest.mark.parametrize("text", ["224.0.0.1", "0.0.0.0", "255.255.255.255"])
-def test_a_multicast_address_is_refused(text):
+def test_an_address_of_several_hosts_is_refused(text):
     with pytest.raises(SettingsError, match="not the address of a single sensor"):
         parse_address(text, 49152)
 

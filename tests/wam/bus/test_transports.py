@@ -194,7 +194,7 @@ def test_a_length_beyond_eight_bytes_reads_only_the_bytes_present(pair):
     assert [len(frame.data) for frame in transport.receive()] == [8]
 
 
-def test_unsent_frames_are_counted(pair):
+def test_unsent_frames_are_detected(pair):
     transport, far = pair
     assert not transport.has_unsent()
     transport.send(0x404, b"\x30")

@@ -214,7 +214,7 @@ def test_a_move_from_a_hold_begins_with_the_torque_of_the_hold(law):
     assert after == pytest.approx(before, abs=1e-9)
 
 
-def test_a_following_move_begins_at_the_end_of_the_previous_one(law):
+def test_a_following_move_begins_without_a_torque_step(law):
     law.enter(ArmState.HOLD, reading(0.0))
     law.move_to(DOWN, 0.5, reading(0.0))
     sagged = DOWN.copy()
