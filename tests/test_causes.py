@@ -20,12 +20,11 @@ CAUSES = {
     ("wam/driver/discovery.py", "has left the bus after too many errors"): (
         "an error frame with the bus-off bit",
         "wam/driver/test_lost_replies.py::"
-        "test_a_controller_that_left_the_bus_is_known_until_the_arm_answers",
+        "test_a_bus_off_controller_is_reported_until_the_arm_answers",
     ),
     ("wam/driver/discovery.py", "No device on the CAN bus acknowledges"): (
         "an error frame with the no-acknowledgement bit",
-        "wam/driver/test_lost_replies.py::"
-        "test_a_host_that_nobody_acknowledges_fills_its_queue",
+        "wam/driver/test_lost_replies.py::test_an_unacknowledged_host_fills_its_queue",
     ),
     ("wam/driver/discovery.py", "its pucks have no power"): (
         "the module answers MODE = 0 and no puck answers",
@@ -33,27 +32,27 @@ CAUSES = {
     ),
     ("wam/driver/safety_module.py", "a puck has lost its position"): (
         "a puck in reset, and ZERO read back as 1 after 0 was written",
-        "wam/driver/test_lost_writes.py::test_no_start_calls_an_arm_zeroed_that_is_not",
+        "wam/driver/test_lost_writes.py::test_no_start_reports_a_lost_zero_as_zeroed",
     ),
     ("wam/driver/arm.py", "replies came after the next question"): (
         "the count of replies in cycles without a request",
         "wam/driver/test_late_replies.py::"
-        "test_a_start_says_that_positions_come_too_late_and_not_that_they_are_missing",
+        "test_a_start_reports_late_positions_as_late_and_not_missing",
     ),
     ("wam/driver/startup.py", "obeys torques although the arm is idle"): (
         "MODE of the puck while the module answers idle",
         "wam/driver/test_lost_writes.py::"
-        "test_a_puck_that_obeys_torques_of_an_idle_arm_is_idled_or_refused",
+        "test_a_puck_in_torque_mode_in_an_idle_arm_is_idled_or_refused",
     ),
     ("wam/driver/startup.py", "number P or T differently"): (
         "the property tables of the firmware versions read from the pucks",
         "wam/driver/test_generations.py::"
-        "test_pucks_that_one_frame_cannot_reach_together_are_refused",
+        "test_pucks_that_cannot_share_a_torque_frame_are_refused",
     ),
     ("wam/driver/arm.py", "answers more often than it is asked"): (
         "replies counted against requests",
         "wam/driver/test_lost_replies.py::"
-        "test_an_arm_that_has_a_puck_twice_is_not_started",
+        "test_an_arm_with_a_duplicated_puck_is_not_started",
     ),
     ("wam/model/moments.py", "to be zeroed"): (
         "a fit with that joint's zero free is better by over four standard deviations",
@@ -68,25 +67,25 @@ CAUSES = {
     ("ft_sensor/calibration/fit.py", "has the opposite sign in the sensor"): (
         "the fitted mass is negative at the stated mounting",
         "ft_sensor/calibration/test_fit.py::"
-        "test_a_weight_of_the_other_sign_is_refused_when_the_mounting_is_stated",
+        "test_an_inverted_weight_is_refused_if_the_mounting_is_stated",
     ),
     ("ft_sensor/calibration/fit.py", "do not change with the orientation"): (
         "the fitted mass is not above zero",
-        "ft_sensor/calibration/test_fit.py::test_readings_of_no_weight_are_refused",
+        "ft_sensor/calibration/test_fit.py::test_readings_without_weight_are_refused",
     ),
     ("ft_sensor/calibration/fit.py", "too similar"): (
         "the condition number of the orientations",
-        "ft_sensor/calibration/test_fit.py::test_orientations_that_are_alike_are_refused",
+        "ft_sensor/calibration/test_fit.py::test_similar_orientations_are_refused",
     ),
     ("ft_sensor/serial_line/startup.py", "stands still"): (
         "device times of a whole check are equal",
         "ft_sensor/vendors/test_bota_sensor.py::"
-        "test_standing_device_clock_is_refused_at_the_start",
+        "test_a_stopped_device_clock_is_refused_at_start",
     ),
     ("ft_sensor/vendors/bota_device.py", "raw gauge data or absurd forces"): (
         "the status bit, or forces beyond the stated limits",
         "ft_sensor/vendors/test_bota_sensor.py::"
-        "test_matrix_that_stays_inactive_is_refused",
+        "test_a_matrix_that_stays_inactive_is_refused",
     ),
     ("analysis/data/inertia.py", "show no acceleration"): (
         "the median period of the samples against the window",

@@ -8,7 +8,7 @@ LIMITS = [1.0, 2.0, 3.0]
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_magnitude_may_be_its_limit_and_no_more(sign):
+def test_a_magnitude_may_equal_but_not_exceed_its_limit(sign):
     assert are_within([sign * limit for limit in LIMITS], LIMITS)
     for joint in range(3):
         values = [0.0] * 3
@@ -16,7 +16,7 @@ def test_a_magnitude_may_be_its_limit_and_no_more(sign):
         assert not are_within(values, LIMITS)
 
 
-def test_a_value_may_be_on_its_bounds_and_not_beyond_either():
+def test_a_value_may_be_on_its_bounds_but_not_beyond():
     lower, upper = [-1.0, 0.5, -3.0], [1.0, 2.0, -2.0]
     assert are_between(lower, lower, upper)
     assert are_between(lower, upper, upper)
@@ -30,7 +30,7 @@ def test_a_value_may_be_on_its_bounds_and_not_beyond_either():
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("joint", range(3))
-def test_what_is_no_number_is_within_nothing(value, joint):
+def test_nan_is_within_no_bounds(value, joint):
     values = [0.0] * 3
     values[joint] = value
     assert not are_within(values, LIMITS)

@@ -32,7 +32,7 @@ def record():
 
 
 @given(names=st.lists(texts, max_size=4), values=doubles, frame=texts)
-def test_joint_states_of_any_length_decode_to_what_went_in(names, values, frame):
+def test_joint_states_of_any_length_round_trip(names, values, frame):
     array = np.array(values, np.float64)
     writer = CdrWriter().header(STAMP_NS, frame).strings(names)
     payload = writer.sequence(array).sequence(array[:1]).sequence(array).finish()
@@ -53,19 +53,19 @@ def test_doubles_are_padded_to_eight_after_their_count(padding):
 
 
 @given(text=texts)
-def test_strings_are_what_another_writer_makes(text):
+def test_strings_agree_with_an_independent_writer(text):
     payload = encode_string(text)
     message = decode("std_msgs/msg/String", payload)
     assert message.data == text
     assert encode("std_msgs/msg/String", message) == payload
 
 
-def test_text_that_is_no_unicode_does_not_end_a_recording():
+def test_text_that_is_not_unicode_does_not_end_a_recording():
     assert decode("std_msgs/msg/String", encode_string("mark \udc80")).data == "mark ?"
 
 
 @given(level=st.sampled_from([10, 20, 30, 40, 50]), name=texts, text=texts)
-def test_events_decode_to_what_went_in(level, name, text):
+def test_events_round_trip(level, name, text):
     message = decode("rcl_interfaces/msg/Log", encode_log(STAMP_NS, level, name, text))
     assert (message.level, message.name, message.msg) == (level, name, text)
     assert (message.stamp.sec, message.stamp.nanosec) == (1_700_000_000, 1)
@@ -73,7 +73,7 @@ def test_events_decode_to_what_went_in(level, name, text):
 
 
 @pytest.mark.parametrize("topic", VIEWS)
-def test_views_are_what_another_writer_makes(record, topic):
+def test_views_agree_with_an_independent_writer(record, topic):
     payload = encode_views(record, STAMP_NS)[topic]
     message = decode(VIEWS[topic], payload)
     assert encode(VIEWS[topic], message) == payload

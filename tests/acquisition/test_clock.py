@@ -52,7 +52,7 @@ def test_the_system_clock_does_not_go_back():
     assert readings == sorted(readings)
 
 
-def test_a_deadline_that_has_passed_is_not_waited_for(monkeypatch):
+def test_a_passed_deadline_is_not_waited_for(monkeypatch):
     clock = SystemClock()
     before = clock.now_ns()
     clock.sleep_until(before - 10**9)
@@ -68,7 +68,7 @@ def test_a_signal_does_not_shorten_a_sleep(monkeypatch):
     assert answers == []
 
 
-def test_a_system_without_such_a_sleep_sleeps_as_long(monkeypatch):
+def test_a_system_without_absolute_sleep_sleeps_as_long(monkeypatch):
     monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: SimpleNamespace())
     clock = SystemClock()
     slept = []
@@ -94,7 +94,7 @@ def test_a_sleep_is_asked_for_as_an_absolute_time(monkeypatch):
 
 
 @pytest.mark.parametrize("descriptor", [-1, 0])
-def test_waiting_for_a_link_with_news_returns_at_once(descriptor):
+def test_waiting_for_a_readable_link_returns_at_once(descriptor):
     link = Link(is_readable=True, descriptor=descriptor)
     assert SystemClock().wait(link, deadline_ns=0)
 
@@ -109,7 +109,7 @@ def test_utc_is_monotonic_time_plus_the_offset():
     assert utc_offset_ns(clock) == (EPOCH_UTC_NS - START_NS, 0)
 
 
-def test_of_several_readings_the_tightest_counts():
+def test_the_tightest_of_several_readings_counts():
     durations = [500, 40, 3, 900] + [50] * 16
     clock = UnevenClock(durations)
     assert utc_offset_ns(clock) == (1_000_000, 3)
@@ -120,13 +120,13 @@ def test_the_uncertainty_is_half_the_tightest_reading():
     assert utc_offset_ns(clock)[1] == 700
 
 
-def test_the_kernel_is_asked_to_be_punctual():
+def test_the_kernel_timer_slack_is_minimised():
     SystemClock()
     get_timer_slack = 30  # PR_GET_TIMERSLACK [ns], 50 us unless asked
     assert ctypes.CDLL(None).prctl(get_timer_slack) == 1
 
 
-def test_the_last_part_before_a_deadline_is_watched_not_slept(monkeypatch):
+def test_the_last_part_before_a_deadline_is_busy_waited(monkeypatch):
     clock = SystemClock(spin_ns=300_000)
     woken = []
 

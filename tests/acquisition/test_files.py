@@ -24,7 +24,7 @@ def test_a_pipe_a_folder_and_a_device_are_not_opened(tmp_path):
             read_regular(path, 10, is_link_followed=True)
 
 
-def test_a_link_is_followed_only_where_it_is_asked_for(tmp_path):
+def test_a_link_is_followed_only_on_request(tmp_path):
     (tmp_path / "file").write_bytes(b"content")
     (tmp_path / "link").symlink_to("file")
     assert read_regular(tmp_path / "link", 10, is_link_followed=True) == b"content"
@@ -33,14 +33,14 @@ def test_a_link_is_followed_only_where_it_is_asked_for(tmp_path):
     assert refused.value.errno == errno.ELOOP
 
 
-def test_a_file_may_have_as_many_bytes_as_stated_and_no_more(tmp_path):
+def test_a_file_may_have_its_size_limit_and_no_more(tmp_path):
     (tmp_path / "file").write_bytes(bytes(10))
     assert len(read_regular(tmp_path / "file", 10)) == 10
     with pytest.raises(UnfitFileError, match="larger"):
         read_regular(tmp_path / "file", 9)
 
 
-def test_a_file_takes_its_own_size_of_memory_however_much_it_may_have(tmp_path):
+def test_reading_a_file_takes_memory_of_its_size_only(tmp_path):
     content = bytes(range(256)) * 12_000  # three pieces
     (tmp_path / "file").write_bytes(content)
     tracemalloc.start()
@@ -51,7 +51,7 @@ def test_a_file_takes_its_own_size_of_memory_however_much_it_may_have(tmp_path):
         tracemalloc.stop()
 
 
-def test_a_new_file_replaces_none(tmp_path):
+def test_a_new_file_does_not_replace_another(tmp_path):
     (tmp_path / "file").write_bytes(b"old")
     with open_directory(tmp_path) as folder, pytest.raises(FileExistsError):
         create_file(folder, "file", b"new")
@@ -59,7 +59,7 @@ def test_a_new_file_replaces_none(tmp_path):
 
 
 @pytest.mark.parametrize("call", ["fsync", "replace"])
-def test_a_write_that_fails_leaves_the_old_file_alone(tmp_path, monkeypatch, call):
+def test_a_failed_write_leaves_the_old_file_unchanged(tmp_path, monkeypatch, call):
     (tmp_path / "file").write_bytes(b"old")
 
     def fail(*_, **__):
@@ -71,7 +71,7 @@ def test_a_write_that_fails_leaves_the_old_file_alone(tmp_path, monkeypatch, cal
     assert [path.read_bytes() for path in tmp_path.iterdir()] == [b"old"]
 
 
-def test_what_is_written_has_the_permissions_that_were_asked_for(tmp_path):
+def test_a_written_file_has_the_requested_permissions(tmp_path):
     with open_directory(tmp_path) as folder:
         replace_file(folder, "file", b"own", mode=0o600)
     assert (tmp_path / "file").stat().st_mode & 0o777 == 0o600

@@ -13,7 +13,7 @@ def described(tmp_path, vendor="AuthenticAMD", family="26", flags=FLAGS):
     return path
 
 
-def test_a_processor_newer_than_openblas_is_given_kernels_that_it_has(tmp_path):
+def test_a_processor_unknown_to_openblas_gets_compatible_kernels(tmp_path):
     named = openblas_settings(described(tmp_path))
     assert named == THREADS | {"OPENBLAS_CORETYPE": "SkylakeX"}
 
@@ -27,11 +27,11 @@ def test_a_processor_newer_than_openblas_is_given_kernels_that_it_has(tmp_path):
         {"family": "unknown"},
     ],
 )
-def test_any_other_is_left_to_openblas(tmp_path, other):
+def test_other_processors_are_left_to_openblas(tmp_path, other):
     assert openblas_settings(described(tmp_path, **other)) == THREADS
 
 
-def test_without_a_description_there_is_one_thread(tmp_path):
+def test_without_processor_information_there_is_one_thread(tmp_path):
     assert openblas_settings(tmp_path / "none") == THREADS
     (tmp_path / "empty").write_text("")
     assert openblas_settings(tmp_path / "empty") == THREADS

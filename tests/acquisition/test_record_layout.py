@@ -25,6 +25,6 @@ def test_a_packed_record_is_read_field_by_field():
     assert np.frombuffer(packed, TIMING_DTYPE)[0].tolist() == tuple(range(7))
 
 
-def test_a_layout_with_gaps_that_no_field_fills_is_refused():
+def test_a_layout_with_implicit_padding_is_refused():
     with pytest.raises(ValueError, match="gaps"):
         struct_of(np.dtype([("a", "u1"), ("b", "<u8")], align=True))

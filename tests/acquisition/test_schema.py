@@ -41,7 +41,7 @@ def numbers_of(layout):
     return [n for n in names[5:] if not n.startswith("padding")]
 
 
-def test_a_cycle_is_548_bytes_with_its_frame():
+def test_a_cycle_has_its_documented_size():
     assert CYCLE.size == 548
     assert b"wam_base\0" in CYCLE.template
 
@@ -57,7 +57,7 @@ def test_fixed_layouts_decode_bit_identically(layout, seed):
 
 
 @pytest.mark.parametrize("layout", [CYCLE, TRUTH], ids=["cycle", "truth"])
-def test_fixed_layouts_are_byte_for_byte_what_another_writer_makes(layout):
+def test_fixed_layouts_agree_byte_for_byte_with_an_independent_writer(layout):
     payload = filled(layout, 7).tobytes()
     assert encode(layout.type_name, decode(layout.type_name, payload)) == payload
 
@@ -81,7 +81,7 @@ def test_any_frame_name_keeps_the_numbers_aligned(frame_id):
 
 
 @pytest.mark.parametrize("layout", [CYCLE, TRUTH], ids=["cycle", "truth"])
-def test_no_byte_of_a_record_is_left_to_chance(layout):
+def test_every_byte_of_a_record_is_defined(layout):
     sizes = [layout.dtype[name].itemsize for name in layout.dtype.names]
     assert sum(sizes) == layout.size
 

@@ -37,19 +37,19 @@ def holder(tmp_path):
     process.communicate()
 
 
-def test_a_folder_is_gone_after_its_use(tmp_path):
+def test_a_folder_is_removed_after_use(tmp_path):
     with temporary_folder("room", tmp_path) as folder:
         (folder / "file").write_text("x")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_of_a_living_process_stays(holder, tmp_path):
+def test_the_folder_of_a_running_process_is_kept(holder, tmp_path):
     _, path = holder
     remove_abandoned("room", tmp_path)
     assert (path / "file").read_text() == "x"
 
 
-def test_a_folder_of_a_killed_process_goes_with_the_next_one(holder, tmp_path):
+def test_the_folder_of_a_killed_process_is_removed_by_the_next(holder, tmp_path):
     process, path = holder
     process.send_signal(signal.SIGKILL)
     process.wait()
@@ -58,7 +58,7 @@ def test_a_folder_of_a_killed_process_goes_with_the_next_one(holder, tmp_path):
         assert not path.exists()
 
 
-def test_a_folder_of_a_process_that_was_not_collected_yet_goes_too(tmp_path):
+def test_the_folder_of_a_zombie_process_is_removed(tmp_path):
     with subprocess.Popen([sys.executable, "-c", ""]) as process:
         os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
         folder = tmp_path / f"room-{process.pid}-abcdefgh"
@@ -67,7 +67,7 @@ def test_a_folder_of_a_process_that_was_not_collected_yet_goes_too(tmp_path):
             assert not folder.exists()
 
 
-def test_a_locked_folder_stays_though_its_number_is_unknown_here(tmp_path):
+def test_a_locked_folder_is_kept_though_its_process_is_unknown(tmp_path):
     path = tmp_path / f"room-{_dead_pid()}-abc"
     path.mkdir()
     descriptor = os.open(path, os.O_RDONLY)
@@ -79,7 +79,7 @@ def test_a_locked_folder_stays_though_its_number_is_unknown_here(tmp_path):
     assert not path.exists()
 
 
-def test_without_locks_nobody_knows_whether_a_folder_is_in_use(tmp_path, monkeypatch):
+def test_without_locks_a_folder_in_use_is_unknown(tmp_path, monkeypatch):
     def flock(*_):
         raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 
@@ -92,7 +92,7 @@ def test_without_locks_nobody_knows_whether_a_folder_is_in_use(tmp_path, monkeyp
 
 
 @pytest.mark.parametrize("name", ["room-x-abc", "room-1", "other-{pid}-abc"])
-def test_other_names_stay(tmp_path, name):
+def test_folders_of_other_names_are_kept(tmp_path, name):
     path = tmp_path / name.format(pid=_dead_pid())
     path.mkdir()
     remove_abandoned("room", tmp_path)

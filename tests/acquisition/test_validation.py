@@ -27,17 +27,17 @@ def problem(content):
     return caught.value
 
 
-def test_of_a_list_no_value_is_looked_at_after_the_first_wrong_one():
+def test_a_list_is_checked_up_to_its_first_wrong_value():
     assert problem({"rows": [1] * 1000, "named": {}}).error_count() == 1
 
 
-def test_of_a_table_with_too_many_keys_no_value_is_looked_at():
+def test_values_of_a_table_with_too_many_keys_are_not_checked():
     error = problem({"rows": [], "named": {str(k): 1 for k in range(201)}})
     assert error.error_count() == 1
     assert first_problem(error) == "named: 201 entries, the most are 200"
 
 
-def test_a_table_of_200_keys_is_taken():
+def test_a_table_with_as_many_keys_as_allowed_is_accepted():
     named = {str(k): {"size": k} for k in range(200)}
     assert len(Rows.model_validate({"rows": [], "named": named}).named) == 200
 
@@ -52,11 +52,11 @@ def test_a_table_of_200_keys_is_taken():
         ({"rows": [], "named": {"x" * 999: 1}}, f"named.{'x' * 60}: Input should be"),
     ],
 )
-def test_the_first_problem_is_told_by_its_place(content, words):
+def test_the_first_problem_is_reported_with_its_location(content, words):
     assert first_problem(problem(content)).startswith(words)
 
 
-def test_what_another_check_says_is_told_as_it_is():
+def test_the_message_of_another_check_is_passed_on():
     assert first_problem(ValueError("3 poses")) == "3 poses"
     with pytest.raises(ValidationError) as caught:
         TypeAdapter(int).validate_python("x")

@@ -46,7 +46,7 @@ for path in sorted(Path(sys.argv[2]).iterdir()):
 
 
 @pytest.mark.slow
-def test_no_file_of_the_corpus_does_harm():
+def test_no_file_of_the_corpus_is_harmful():
     done = subprocess.run(
         [sys.executable, "-c", READER, str(MEMORY), str(CORPUS)],
         cwd=ROOT,
@@ -85,7 +85,7 @@ def test_a_terrain_file_needs_finite_numbers():
 
 
 @given(st.text(st.characters(exclude_categories=["Cs"]), max_size=40))
-def test_what_is_said_of_a_terrain_survives_its_file(text):
+def test_a_terrain_description_round_trips(text):
     written = terrain_to_toml("S10", FRAME, {"remark": text})
     assert terrain_metadata(written) == {"remark": text}
 

@@ -83,7 +83,7 @@ def data(tmp_path):
 
 
 @pytest.mark.parametrize("name", SESSION_FILES)
-def test_three_gigabytes_in_a_session_are_not_read(data, name):
+def test_an_oversized_session_file_is_not_read(data, name):
     path = next(p for p in data.rglob("*") if str(p).endswith(name))
     sparse(path, 3 * 2**30)
     for command in COMMANDS:
@@ -92,7 +92,7 @@ def test_three_gigabytes_in_a_session_are_not_read(data, name):
         assert ended.memory < MEMORY, (command, ended)
 
 
-def test_three_gigabytes_of_a_partial_file_are_not_recovered(data):
+def test_an_oversized_partial_file_is_not_recovered(data):
     path = next(data.rglob("trials")) / "T03.mcap.partial"
     path.touch()
     sparse(path, 3 * 2**30)
@@ -161,7 +161,7 @@ def test_a_database_beyond_its_limits_is_refused(tmp_path, name):
     assert ended.memory < MEMORY, ended
 
 
-def test_a_journal_of_more_events_than_a_session_has_is_refused(data):
+def test_a_journal_with_too_many_events_is_refused(data):
     path = next(data.rglob("events.jsonl"))
     path.write_bytes(b"{}\n" * (4 * 2**20 // 3))
     ended = run("verify", "--all", "--data", data, cwd=data.parent)
@@ -170,7 +170,7 @@ def test_a_journal_of_more_events_than_a_session_has_is_refused(data):
     assert ended.memory < MEMORY
 
 
-def test_settings_of_three_gigabytes_are_not_read(tmp_path):
+def test_oversized_settings_are_not_read(tmp_path):
     sparse(tmp_path / "rig.toml", 3 * 2**30)
     ended = run("status", "--config", tmp_path / "rig.toml", cwd=tmp_path)
     assert ended.code == 2

@@ -59,7 +59,7 @@ STATED = (
 )
 
 
-def test_the_limits_proved_here_are_those_that_are_stated():
+def test_the_tested_limits_are_the_documented_ones():
     rows = re.findall(r"^  \| .*$", SECURITY, re.MULTILINE)
     for row, stated in zip(rows[1:], STATED, strict=True):  # behind the head
         assert row.strip().endswith(stated)
@@ -78,13 +78,13 @@ def sparse(path, size):
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_a_file_of_a_session_may_have_its_size_and_no_byte_more(tmp_path, name):
+def test_a_session_file_may_have_its_size_limit_and_no_more(tmp_path, name):
     os.close(open_data(sparse(tmp_path / name, FILES[name])))
     with pytest.raises(TrialFileError, match=f"the limit is {FILES[name]}"):
         open_data(sparse(tmp_path / name, FILES[name] + 1))
 
 
-def test_a_journal_may_have_fifty_thousand_lines(tmp_path):
+def test_a_journal_may_have_its_limit_of_lines(tmp_path):
     folder = create_session(tmp_path, "S0", is_simulated=True, utc_ns=0)
     journal = folder.path / "events.jsonl"
     first, line = journal_line({}, 1), journal_line({}, 2)
@@ -95,7 +95,7 @@ def test_a_journal_may_have_fifty_thousand_lines(tmp_path):
         folder.events()
 
 
-def test_json_has_no_nan_and_integers_of_4300_digits():
+def test_json_has_no_nan_and_bounded_integers():
     assert parse_object(b'{"a": %s}' % (b"9" * 4300)) is not None
     assert parse_object(b'{"a": %s}' % (b"9" * 4301)) is None
     for value in (b"NaN", b"Infinity", b"-Infinity", b"1e999"):
@@ -105,11 +105,11 @@ def test_json_has_no_nan_and_integers_of_4300_digits():
 # --- trial files ----------------------------------------------------------------------
 
 
-def test_all_chunks_of_a_file_unpack_to_192_mib_at_most():
+def test_chunks_of_a_file_unpack_within_their_total_limit():
     assert unpacked_limit(64 * MIB) == unpacked_limit(10**12) == 192 * MIB
 
 
-def test_a_record_and_a_chunk_have_16_mib_at_most(tmp_path):
+def test_a_record_and_a_chunk_have_a_size_limit(tmp_path):
     path = tmp_path / "T01.mcap"
     for size, reason in ((16 * MIB, "states 16777216"), (16 * MIB + 1, "over 16 MiB")):
         salvage = SoundRecords(with_chunk(b"x", size, ""), path)
@@ -117,7 +117,7 @@ def test_a_record_and_a_chunk_have_16_mib_at_most(tmp_path):
         assert reason in salvage.reason
 
 
-def test_chunks_that_unpack_to_too_much_end_what_is_read(tmp_path):
+def test_reading_ends_at_chunks_that_unpack_too_large(tmp_path):
     """Each holds one unknown record of 16 MiB, packed into less than a kilobyte."""
     content = b"\x99" + (16 * MIB - 9).to_bytes(8, "little") + bytes(16 * MIB - 9)
     data = with_chunk(zstandard.compress(content), 16 * MIB)
@@ -130,7 +130,7 @@ def test_chunks_that_unpack_to_too_much_end_what_is_read(tmp_path):
     assert salvage.gaps[0].start == chunk.start + 4 * (chunk.end - chunk.start)
 
 
-def test_chunks_may_unpack_to_all_that_is_allowed(tmp_path):
+def test_chunks_may_unpack_up_to_the_limit(tmp_path):
     """Twelve of 16 MiB each; zeros behind them make the file large enough."""
     content = b"\x99" + (16 * MIB - 9).to_bytes(8, "little") + bytes(16 * MIB - 9)
     data = with_chunk(zstandard.compress(content), 16 * MIB)
@@ -144,7 +144,7 @@ def test_chunks_may_unpack_to_all_that_is_allowed(tmp_path):
     assert "unpack to too much" in salvage.reason
 
 
-def test_a_trial_has_no_more_cycles_than_are_allowed(tmp_path, monkeypatch):
+def test_a_trial_may_have_its_limit_of_cycles(tmp_path, monkeypatch):
     """Of 50 cycles, with the limit put beside them."""
     path = tmp_path / "T01.mcap"
     seal(write_trial(path, make_cycles(50)), "travel")
@@ -159,7 +159,7 @@ def test_a_trial_has_no_more_cycles_than_are_allowed(tmp_path, monkeypatch):
 # --- what a person writes -------------------------------------------------------------
 
 
-def test_a_text_may_have_a_megabyte(tmp_path):
+def test_a_text_may_have_its_size_limit(tmp_path):
     path = tmp_path / "rig.toml"
     path.write_bytes(b"#" * 1_000_000)
     assert len(read_text(path)) == 1_000_000
@@ -185,7 +185,7 @@ def test_every_text_is_read_under_that_limit(tmp_path, name):
 
 
 @pytest.mark.parametrize("name", READERS)
-def test_no_text_is_read_from_a_pipe(tmp_path, name):
+def test_text_is_not_read_from_a_pipe(tmp_path, name):
     (tmp_path / "rig.toml").write_text(load_settings(None).rig_text)
     (tmp_path / name).unlink(missing_ok=True)
     os.mkfifo(tmp_path / name)
@@ -200,7 +200,7 @@ def test_integers_have_64_bits(sign):
         parse_toml(f"a = {sign}{2**63 + 1}")
 
 
-def test_tables_and_arrays_nest_20_levels():
+def test_tables_and_arrays_nest_to_a_limited_depth():
     assert parse_toml("a = " + "[" * 19 + "1" + "]" * 19)
     assert parse_toml(".".join("a" * 20) + " = 1")
     for text in ("a = " + "[" * 20 + "1" + "]" * 20, ".".join("a" * 21) + " = 1"):
@@ -214,7 +214,7 @@ HEADER = "t,v_t,F_n,F_t\n"
 ROWS = "".join(f"{0.1 * k:.1f},0.1,2,1\n" for k in range(200))
 
 
-def test_a_table_may_have_24_megabytes(tmp_path):
+def test_a_table_may_have_its_size_limit(tmp_path):
     path = tmp_path / "table.csv"
     path.write_text(HEADER + ROWS)
     assert load_tables([path])
@@ -223,7 +223,7 @@ def test_a_table_may_have_24_megabytes(tmp_path):
 
 
 @pytest.mark.parametrize(("length", "is_read"), [(65_535, True), (65_536, False)])
-def test_a_line_of_a_table_is_shorter_than_65536_characters(tmp_path, length, is_read):
+def test_a_table_line_has_a_length_limit(tmp_path, length, is_read):
     path = tmp_path / "table.csv"
     line = "20.0,0.1,2,1"
     path.write_text(HEADER + ROWS + line.ljust(length - 1) + "\n")
@@ -237,7 +237,7 @@ def test_a_line_of_a_table_is_shorter_than_65536_characters(tmp_path, length, is
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("count", "is_read"), [(2000, True), (2001, False)])
-def test_an_npz_may_hold_2000_trials_in_little_memory(
+def test_an_npz_with_many_trials_needs_little_memory(
     tmp_path, monkeypatch, count, is_read
 ):
     monkeypatch.setattr(tables, "share_of_memory", lambda _, least: least)
@@ -251,7 +251,7 @@ def test_an_npz_may_hold_2000_trials_in_little_memory(
         load_tables([path])
 
 
-def test_an_npz_counts_unpacked(tmp_path):
+def test_an_npz_is_limited_by_its_unpacked_size(tmp_path):
     rows = np.zeros((760_000, 4))
     np.savez_compressed(tmp_path / "trials.npz", **{"TF/0": rows})
     assert (tmp_path / "trials.npz").stat().st_size < 100_000
@@ -283,13 +283,13 @@ def test_a_database_of_the_largest_size_is_read(tmp_path, most):
 @pytest.mark.parametrize(
     ("more", "why"), [({"terrains": 201}, "201 entries"), ({"points": 401}, "400")]
 )
-def test_a_database_with_one_more_is_refused(tmp_path, more, why):
+def test_a_database_beyond_the_largest_size_is_refused(tmp_path, more, why):
     with pytest.raises(SettingsError, match=why):
         database.load(stored(tmp_path / "terrains.json", **more))
 
 
 @pytest.mark.parametrize(("size", "is_read"), [(6_000_000, True), (6_000_001, False)])
-def test_a_database_may_have_6_megabytes(tmp_path, size, is_read):
+def test_a_database_may_have_its_size_limit(tmp_path, size, is_read):
     path = stored(tmp_path / "terrains.json")
     path.write_text(path.read_text().ljust(size))
     if is_read:

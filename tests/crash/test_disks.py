@@ -15,7 +15,7 @@ def test_a_failing_disk_loses_no_kept_trial(row, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.timeout(180)
-def test_done_again_the_recording_gives_what_is_on_the_disk(tmp_path):
+def test_replaying_the_recording_gives_the_disk_content(tmp_path):
     recording = record_session(tmp_path)
     root = recording.root
     files = [path for path in root.rglob("*") if path.is_file()]

@@ -30,7 +30,7 @@ def test_start_and_epoch_are_fixed():
     assert (clock.now_ns(), clock.utc_ns()) == (START_NS + 5, EPOCH_UTC_NS + 5)
 
 
-def test_sleeping_lets_the_world_go_on_and_never_back():
+def test_sleeping_advances_the_world_monotonically():
     clock = SteppedClock()
     world = World(clock)
     clock.attach(world)
@@ -56,7 +56,7 @@ def test_waiting_for_nothing_ends_at_the_deadline():
     assert clock.now_ns() == START_NS + 20
 
 
-def test_waiting_for_what_is_there_takes_no_time():
+def test_waiting_for_a_present_event_takes_no_time():
     clock = SteppedClock()
     world = World(clock, START_NS)
     clock.attach(world)
@@ -64,7 +64,7 @@ def test_waiting_for_what_is_there_takes_no_time():
     assert clock.now_ns() == START_NS
 
 
-def test_a_clock_without_a_world_still_tells_the_time():
+def test_a_clock_without_a_world_still_runs():
     clock = SteppedClock()
     assert not clock.wait(World(clock), START_NS + 4)
     assert clock.now_ns() == START_NS + 4

@@ -1,7 +1,7 @@
 # ruff: noqa: E501 - a table that is read row by row
 """The rows of the table of hazards: (hazard, cause, detection, reaction, faults, bound, tests)."""
 
-_MATRIX = "tests/faults/test_matrix.py::test_a_fault_comes_to_what_the_table_says"
+_MATRIX = "tests/faults/test_matrix.py::test_a_fault_has_the_outcome_in_the_table"
 _GUARD = "tests/acquisition/control_loop/test_guard.py::"
 _CYCLE = "tests/acquisition/control_loop/test_cycle.py::"
 _LOOP = "tests/acquisition/control_loop/test_loop.py::"
@@ -11,7 +11,9 @@ _LOST = "tests/wam/driver/test_lost_replies.py::"
 _POLLER = "tests/wam/driver/test_status_poller.py::"
 _CONTACT = "tests/acquisition/control_loop/test_contact.py::"
 _LOCK = "tests/experiments/rig/test_arm_lock.py::"
-_PROCESSES = "tests/faults/test_process_faults.py::test_what_befalls_the_computer_leaves_the_arm_safe"
+_PROCESSES = (
+    "tests/faults/test_process_faults.py::test_computer_faults_leave_the_arm_safe"
+)
 _MOTORS = range(1, 8)
 _LIES = tuple(f"lie-of-motor-{motor}" for motor in _MOTORS)
 _CREEPS = tuple(f"creep-of-motor-{motor}" for motor in _MOTORS)
@@ -37,7 +39,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "no torque is sent meanwhile; hold after 10 ms, idle after 50 ms",
             ("reply-lost", "reply-lost-10", "puck-silent", "puck-reboot"),
             "",
-            (_MATRIX, _GUARD + "test_silence_tells_how_long_and_which_motors"),
+            (_MATRIX, _GUARD + "test_silence_is_reported_with_duration_and_motors"),
         ),
         "stuck": (
             "the joint is pulled faster and faster while the arm moves by itself; in a trial speed and place are recorded wrongly",
@@ -48,9 +50,9 @@ ROWS: dict[str, dict[str, Fields]] = {
             "measured in a move and while the sole stands. On an arm almost without friction (0.02) a wrist joint reaches 1.7 of its limit in other moves, with 0.3 of it 1.1. An encoder that freezes within the last 17 mrad of joint 7's way is noticed in the next move only. In a trial motor 7, frozen, lets the ground turn the foot: 2.1 of the limit",
             (
                 _MATRIX,
-                "tests/fakes/world/test_stopped_moves.py::test_a_motor_whose_encoder_freezes_in_a_move_is_noticed",
-                "tests/faults/test_stuck_in_trials.py::test_a_frozen_motor_ends_a_trial_before_the_arm_is_fast",
-                "tests/faults/test_stuck_in_trials.py::test_a_frozen_motor_that_hardly_turns_in_a_trial_does_no_harm",
+                "tests/fakes/world/test_stopped_moves.py::test_an_encoder_that_freezes_in_a_move_is_detected",
+                "tests/faults/test_stuck_in_trials.py::test_a_frozen_motor_ends_a_trial_at_low_speed",
+                "tests/faults/test_stuck_in_trials.py::test_a_frozen_motor_that_hardly_turns_is_harmless",
             ),
         ),
         "drifting": (
@@ -71,7 +73,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "a smaller step is not detected",
             (
                 _MATRIX,
-                "tests/fakes/world/test_false_positions.py::test_one_false_position_is_no_blow",
+                "tests/fakes/world/test_false_positions.py::test_one_rejected_position_gives_no_torque_step",
             ),
         ),
         "late": (
@@ -92,7 +94,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "",
             (
                 _LOST + "test_a_late_reply_never_answers_the_next_question",
-                "tests/wam/driver/test_late_replies.py::test_replies_that_are_late_for_ever_are_found_or_missing",
+                "tests/wam/driver/test_late_replies.py::test_permanently_late_replies_are_detected_or_missing",
             ),
         ),
     },
@@ -134,7 +136,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             ("not-a-number", "torque-limit", "puck-changed", *_SAID, *_DISOBEYING),
             "",
             (
-                _GUARD + "test_what_is_no_number_ends_in_idle",
+                _GUARD + "test_a_quantity_that_is_not_a_number_ends_in_idle",
                 _CYCLE + "test_the_command_after_a_verdict_is_within_limits_too",
             ),
         ),
@@ -145,7 +147,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "hold after more than 10 late cycles in a second",
             ("stall-3-ms", "stall-20-ms", "bus-flooded"),
             "",
-            (_GUARD + "test_eleven_late_cycles_in_a_second_end_in_hold",),
+            (_GUARD + "test_late_cycles_beyond_the_limit_end_in_hold",),
         ),
     },
     "safety mode": {
@@ -156,7 +158,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "hold; idle asked for after 400 ms",
             ("safety-silent",),
             "",
-            (_GUARD + "test_the_age_of_the_modules_last_answer_is_told",),
+            (_GUARD + "test_the_age_of_the_modules_last_reply_is_reported",),
         ),
         "stuck": (
             "the module says ACTIVE for ever, or does not obey IDLE",
@@ -166,7 +168,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             ("safety-disobedient",),
             "",
             (
-                _CYCLE + "test_an_unconfirmed_idle_is_unknown_and_nothing_is_let_fall",
+                _CYCLE + "test_an_unconfirmed_idle_is_unknown_and_keeps_the_torque",
                 _ARM
                 + "test_an_arm_that_is_only_listened_to_is_braked_by_its_own_module",
             ),
@@ -179,7 +181,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "before the first torque",
             (
-                "tests/wam/driver/test_safety_limits.py::test_a_module_that_keeps_its_limit_is_driven_and_both_values_are_told",
+                "tests/wam/driver/test_safety_limits.py::test_a_module_that_keeps_its_limit_is_driven_with_both_values_reported",
             ),
         ),
         "implausible": (
@@ -189,7 +191,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "as lost; positions are asked for no more, and the module's heartbeat idles the arm",
             ("safety-silent", "safety-false-idle"),
             "",
-            (_POLLER + "test_a_mode_that_does_not_exist_is_no_answer",),
+            (_POLLER + "test_an_undefined_mode_is_not_a_reply",),
         ),
         "late": (
             "a stop is known late",
@@ -209,7 +211,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "as at a stop, where the module reports one",
             ("estop",),
             "",
-            (_GUARD + "test_brakes_after_a_state_that_may_drive_are_a_stop",),
+            (_GUARD + "test_brakes_after_a_driving_state_are_a_stop",),
         ),
         "stuck": (
             "the stop stays pressed",
@@ -218,7 +220,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "refused, or the session ends",
             ("estop",),
             "",
-            (_CYCLE + "test_a_stop_is_told_before_the_arm_was_ever_active",),
+            (_CYCLE + "test_a_stop_is_reported_before_the_first_activation",),
         ),
         "drifting": (
             "idle is pressed between activation and the first cycle; activate is pressed before the program asks for it: torques are zero, the arm would fall",
@@ -227,10 +229,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "idle, the session ends",
             ("pendant-idle", "early-activation"),
             "",
-            (
-                _CYCLE
-                + "test_a_request_in_the_moment_of_the_pendants_idle_does_not_hide_it",
-            ),
+            (_CYCLE + "test_a_simultaneous_request_does_not_hide_idle_at_the_pendant",),
         ),
         "implausible": (
             "lamps contradict each other",
@@ -239,7 +238,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "one at the start: a warning, recorded, that monitor is left out; later: the word is counted and ignored, the mode counts",
             (),
             "none: the mode is asked for by itself",
-            (_POLLER + "test_a_word_that_makes_no_sense_is_counted_and_ignored",),
+            (_POLLER + "test_an_invalid_word_is_counted_and_ignored",),
         ),
         "late": (
             "torques against shorted windings",
@@ -248,7 +247,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "idle confirmed, zero torque",
             ("estop", "pendant-idle"),
             "",
-            (_ARM + "test_an_e_stop_is_known_within_four_incomplete_cycles",),
+            (_ARM + "test_an_e_stop_is_detected_within_a_few_incomplete_cycles",),
         ),
     },
     "F/T wrench": {
@@ -259,7 +258,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "hold, trial interrupted",
             ("ft-stale", "ft-unplugged"),
             "in a move contact is not noticed then",
-            (_CYCLE + "test_a_silent_sensor_stops_a_trial_after_20_ms",),
+            (_CYCLE + "test_a_silent_sensor_stops_a_trial_after_its_timeout",),
         ),
         "stuck": (
             "an old force is recorded as new",
@@ -270,7 +269,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "a channel of a coarser sensor is told after the trial only",
             (
                 _MATRIX,
-                "tests/ft_sensor/vendors/test_sensor_contract.py::test_one_number_that_stands_still_is_invalid_until_it_moves",
+                "tests/ft_sensor/vendors/test_sensor_contract.py::test_one_frozen_reading_is_invalid_until_it_changes",
                 "tests/experiments/run/test_quality.py::test_a_frozen_channel_is_named_and_nothing_of_the_sensor_is_ticked",
             ),
         ),
@@ -281,7 +280,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "none on the arm: force commands nothing",
             ("ft-jump", "ft-reboot"),
             "0.5 N in a tare",
-            ("tests/ft_sensor/test_tare.py::test_touching_is_refused_in_numbers",),
+            ("tests/ft_sensor/test_tare.py::test_a_touch_is_refused_with_its_spread",),
         ),
         "implausible": (
             "no number, or beyond the range",
@@ -290,7 +289,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "the sample is not used; saturation is told at the review",
             ("ft-garbled", "ft-not-a-number", "ft-saturated"),
             "",
-            (_CYCLE + "test_a_sample_the_device_does_not_vouch_for_is_not_used",),
+            (_CYCLE + "test_an_invalid_sample_is_not_used",),
         ),
         "late": (
             "force and speed of different moments",
@@ -300,7 +299,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             ("ft-clock-jump", "stall-20-ms"),
             "",
             (
-                "tests/ft_sensor/serial_line/test_clock_fit.py::test_a_time_is_known_to_a_tenth_of_a_millisecond",
+                "tests/ft_sensor/serial_line/test_clock_fit.py::test_a_device_time_is_mapped_accurately",
             ),
         ),
     },
@@ -353,7 +352,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "hold after more than 10 in a second",
             ("stall-3-ms", "stall-20-ms"),
             "",
-            (_LOOP + "test_a_cycle_that_is_half_a_millisecond_late_is_counted",),
+            (_LOOP + "test_a_cycle_late_by_the_limit_is_counted",),
         ),
     },
     "console heartbeat": {
@@ -366,8 +365,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "0.6 s to an arm that holds",
             (
                 _PROCESSES,
-                _SERVER
-                + "test_an_orphaned_arm_holds_at_once_and_brakes_after_a_second",
+                _SERVER + "test_an_orphaned_arm_holds_at_once_and_idles_later",
             ),
         ),
         "stuck": (
@@ -377,10 +375,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "hold; the bell rings every second after a minute",
             (),
             "0.5 s",
-            (
-                _SERVER
-                + "test_a_silent_console_makes_the_arm_hold_within_half_a_second",
-            ),
+            (_SERVER + "test_a_silent_console_makes_the_arm_hold_after_its_timeout",),
         ),
         "drifting": (
             "none: the beat has no value",
@@ -389,7 +384,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "none",
             (),
             "none",
-            (_SERVER + "test_a_beating_console_and_recorder_leave_the_arm_alone",),
+            (_SERVER + "test_heartbeats_of_console_and_recorder_cause_no_verdict",),
         ),
         "implausible": (
             "a command that was not given",
@@ -409,7 +404,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "hold",
             (),
             "0.5 s",
-            (_SERVER + "test_a_console_that_comes_back_is_believed",),
+            (_SERVER + "test_a_returning_console_is_accepted",),
         ),
     },
     "recorder": {
@@ -439,7 +434,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "no effect on the arm",
             (
-                "tests/acquisition/recording/test_recorder.py::test_what_the_ring_lost_is_in_the_result",
+                "tests/acquisition/recording/test_recorder.py::test_losses_of_the_ring_are_in_the_result",
             ),
         ),
         "implausible": (
@@ -461,7 +456,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "0.25 s of a trial",
             (
-                "tests/acquisition/recording/test_recorder.py::test_the_file_is_forced_to_the_disk_every_quarter_second",
+                "tests/acquisition/recording/test_recorder.py::test_the_file_is_synced_at_its_period",
             ),
         ),
     },
@@ -539,7 +534,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "as lost",
             ("bus-flooded",),
             "",
-            (_LOST + "test_a_bus_used_to_sixty_percent_by_others_costs_no_cycle",),
+            (_LOST + "test_heavy_foreign_bus_traffic_costs_no_cycle",),
         ),
         "drifting": (
             "errors grow",
@@ -582,8 +577,8 @@ ROWS: dict[str, dict[str, Fields]] = {
             ("ft-stale", "ft-unplugged"),
             "the torque that moves a joint for certain, then idle",
             (
-                "tests/fakes/world/test_stopped_moves.py::test_a_hand_that_holds_the_arm_in_a_move_has_it_braked",
-                _CONTACT + "test_before_the_first_tare_nothing_is_known_of_the_load",
+                "tests/fakes/world/test_stopped_moves.py::test_holding_the_arm_in_a_move_brakes_it",
+                _CONTACT + "test_before_the_first_tare_the_load_is_unknown",
             ),
         ),
         "stuck": (
@@ -593,7 +588,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "the trial ends, the arm holds",
             (),
             "40 N more than before",
-            (_CONTACT + "test_a_force_that_grows_while_the_foot_stands_ends_a_trial",),
+            (_CONTACT + "test_a_force_that_grows_on_a_foot_at_rest_ends_a_trial",),
         ),
         "drifting": (
             "a move is stopped though nothing is met",
@@ -613,10 +608,8 @@ ROWS: dict[str, dict[str, Fields]] = {
             "",
             (
                 _MATRIX,
-                _CONTACT
-                + "test_what_an_arm_meets_in_its_own_move_makes_it_hold_after_ten_milliseconds",
-                _CONTACT
-                + "test_a_load_beyond_a_limit_is_a_fault_after_ten_milliseconds",
+                _CONTACT + "test_contact_in_a_move_makes_the_arm_hold",
+                _CONTACT + "test_a_load_beyond_a_limit_is_a_fault_after_its_duration",
             ),
         ),
         "late": (
@@ -626,7 +619,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "as implausible",
             (),
             "16 ms and a cycle, 5 mm at 0.3 m/s",
-            (_CONTACT + "test_a_blow_that_is_over_at_once_is_no_fault",),
+            (_CONTACT + "test_a_brief_blow_is_not_a_fault",),
         ),
     },
     "second command": {
@@ -710,7 +703,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             ("ft-clock-jump",),
             "",
             (
-                "tests/ft_sensor/serial_line/test_clock_fit.py::test_two_clocks_never_run_further_apart_than_crystals_do",
+                "tests/ft_sensor/serial_line/test_clock_fit.py::test_clock_drift_is_bounded_by_crystal_tolerance",
             ),
         ),
         "implausible": (
@@ -732,7 +725,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "no effect on the arm",
             (
-                "tests/ft_sensor/serial_line/test_link.py::test_latency_timer_is_read_back",
+                "tests/ft_sensor/serial_line/test_link.py::test_the_latency_timer_is_read_back",
             ),
         ),
     },
@@ -777,8 +770,8 @@ ROWS: dict[str, dict[str, Fields]] = {
             "with mech_at_home: modulo a motor turn (joint 1: 0.15 rad). By torques that are 0.1 N m rms off: a standard deviation of 0.5 degrees at joint 2, 0.9 at joint 3, 4 at joints 4 and 5; joints 1, 6 and 7 do not show. The residual of 1 N is 13 degrees of the foot's weight",
             (
                 "tests/experiments/preflight/test_zero_check.py::test_five_degrees_in_any_joint_are_noticed_and_the_joint_is_named",
-                "tests/wam/model/test_zero_errors.py::test_six_degrees_at_upper_arm_are_refused_with_the_joint",
-                "tests/wam/model/test_zero_errors.py::test_a_wrong_zero_of_joints_1_6_and_7_does_not_show",
+                "tests/wam/model/test_zero_errors.py::test_a_large_zero_error_is_refused_with_its_joint",
+                "tests/wam/model/test_zero_errors.py::test_a_wrong_zero_of_joints_1_6_and_7_is_not_observable",
             ),
         ),
         "late": (
@@ -811,8 +804,8 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "1.2 times the friction at the largest share leaves no swing",
             (
-                "tests/wam/control/test_friction_compensation.py::test_a_motor_that_swings_as_no_hand_does_ends_it_for_good",
-                "tests/fakes/world/test_compensated_float.py::test_an_overestimate_of_a_fifth_leaves_no_swing",
+                "tests/wam/control/test_friction_compensation.py::test_oscillation_too_fast_for_a_hand_disables_compensation",
+                "tests/fakes/world/test_compensated_float.py::test_overestimated_friction_causes_no_oscillation",
             ),
         ),
         "drifting": (
@@ -823,8 +816,8 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "no energy gained on any closed way at 1.2 times the friction",
             (
-                "tests/wam/control/test_friction_compensation.py::test_random_ways_never_gain_energy_at_a_fifth_too_much",
-                "tests/wam/control/test_friction_compensation.py::test_what_is_badly_known_is_compensated_less",
+                "tests/wam/control/test_friction_compensation.py::test_overcompensated_random_motion_never_gains_energy",
+                "tests/wam/control/test_friction_compensation.py::test_uncertain_friction_is_compensated_less",
             ),
         ),
         "implausible": (
@@ -848,7 +841,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "no swing with 4 ms more",
             (
-                "tests/fakes/world/test_compensated_float.py::test_an_overestimate_of_a_fifth_leaves_no_swing",
+                "tests/fakes/world/test_compensated_float.py::test_overestimated_friction_causes_no_oscillation",
             ),
         ),
     },
@@ -906,7 +899,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "none",
             (
-                "tests/wam/calibration/test_gravity_file.py::test_the_tool_of_the_calibration_fits_and_another_does_not",
+                "tests/wam/calibration/test_gravity_file.py::test_only_the_calibrated_tool_is_accepted",
             ),
         ),
     },

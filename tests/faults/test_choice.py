@@ -17,13 +17,13 @@ def test_the_printed_tables_have_every_fault():
     assert all(f"| `{fault}` |" in printed for fault in faults)
 
 
-def test_the_page_of_hazards_says_what_each_fault_does():
+def test_the_hazard_page_states_the_effect_of_each_fault():
     page = (ROOT / "docs" / "hazards.md").read_text()
     _, _, reactions = page.partition("| reaction |")
     assert all(f"`{fault.value}`" in reactions for fault in FAULTS)
 
 
-def test_every_fault_says_why_the_arm_is_held_damped_or_idled():
+def test_every_fault_states_the_reason_for_its_action():
     assert set(WHY) == set(FAULTS)
     rows = choice_lines()[2:]
     assert [row.split("`")[1] for row in rows] == [fault.value for fault in FAULTS]

@@ -43,26 +43,26 @@ def functions_of(path):
     return {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
 
 
-def test_every_signal_of_the_arm_is_proved_by_steps_that_are_done():
+def test_every_arm_signal_is_checked_by_steps_in_use():
     assert set(PROOFS) | OF_THE_COMPUTER == SIGNALS
     assert not set(PROOFS) & OF_THE_COMPUTER
     assert all(set(steps) <= set(STEPS) and steps for steps in PROOFS.values())
 
 
-def test_the_page_of_hazards_has_every_signal():
+def test_the_hazard_page_has_every_signal():
     page = (ROOT / "docs" / "hazards.md").read_text().lower()
     headed = " ".join(re.findall(r"^\*\*.*", page, re.MULTILINE))
     signals = {signal.lower().removesuffix(" heartbeat") for signal in SIGNALS}
     assert {signal for signal in signals if signal not in headed} == set()
 
 
-def test_every_signal_is_wrong_in_every_way():
+def test_every_signal_has_every_kind_of_fault():
     found = {(row.signal, row.mode) for row in hazards()}
     assert found == {(signal, mode) for signal in SIGNALS for mode in Mode}
 
 
 @pytest.mark.parametrize("row", hazards(), ids=lambda r: f"{r.signal}-{r.mode.value}")
-def test_a_hazard_names_tests_that_exist_and_what_bounds_it(row):
+def test_a_hazard_names_existing_tests_and_its_bound(row):
     assert row.tests
     for test in row.tests:
         path, name = test.split("::")

@@ -16,7 +16,7 @@ from tests.faults.truth import is_within, promise_of
 
 
 @pytest.mark.parametrize("row", parameters(fault_attacks()))
-def test_a_fault_comes_to_what_the_table_says(row, tmp_path):
+def test_a_fault_has_the_outcome_in_the_table(row, tmp_path):
     row.check(tmp_path)
 
 
@@ -24,7 +24,7 @@ def test_a_fault_comes_to_what_the_table_says(row, tmp_path):
 @pytest.mark.timeout(240)
 @pytest.mark.parametrize("speed", [0.05, 0.25, 0.33, 0.4, 0.44])
 @pytest.mark.parametrize("fault", ["replies-late", "replies-late-3", "puck-late"])
-def test_late_positions_are_found_soon_enough_from_any_moment_of_a_move(
+def test_late_positions_are_detected_in_time_at_any_moment_of_a_move(
     fault, speed, tmp_path, monkeypatch
 ):
     # The cycle that asks for none comes just after the strike, or a tenth of a second.
@@ -38,7 +38,7 @@ def test_late_positions_are_found_soon_enough_from_any_moment_of_a_move(
     assert motion.speed <= 0.6
 
 
-def test_every_cell_that_cannot_exist_says_why():
+def test_every_excluded_cell_states_its_reason():
     absent = [c for row in TABLE.values() for c in row if c.end is End.ABSENT]
     assert absent
     assert all(cell.why for cell in absent)
@@ -53,17 +53,17 @@ def test_every_phase_and_every_end_is_in_the_table():
     }
 
 
-def test_an_arm_that_moves_by_itself_meets_every_fault_of_the_table():
+def test_a_moving_arm_is_tested_with_every_fault():
     assert set(MOVING_CELLS) == set(TABLE)
 
 
-def test_every_fault_has_a_printed_bound_and_no_other_has():
+def test_exactly_the_faults_of_the_table_have_a_bound():
     printed = read_bounds()
     assert {(f, p) for f, row in printed.items() for p in row} == {
         (fault, phase) for fault, phase, _ in cells_of_all() if phase in BOUND_PHASES
     }
 
 
-def test_the_cells_that_each_commit_runs_are_in_the_table():
+def test_cells_run_at_each_commit_are_in_the_table():
     cells = {(fault, phase) for fault, phase, _ in cells_of_all()}
     assert cells >= DAILY | WHOLE_TRIALS

@@ -10,9 +10,9 @@ from tests.faults.pairs import EVERY_COMMIT, every_pair, pair_attacks
 @pytest.mark.parametrize(
     "row", parameters(r for r in pair_attacks() if r.run_by is RunBy.TEST)
 )
-def test_two_faults_come_to_what_the_stricter_one_does(row, tmp_path):
+def test_two_faults_have_the_stricter_outcome(row, tmp_path):
     row.check(tmp_path)
 
 
-def test_the_pairs_of_each_commit_are_of_the_table():
+def test_pairs_run_at_each_commit_are_in_the_table():
     assert {*EVERY_COMMIT} <= {*every_pair()}

@@ -7,5 +7,5 @@ from tests.faults.process_faults import process_attacks
 
 
 @pytest.mark.parametrize("row", parameters(process_attacks()))
-def test_what_befalls_the_computer_leaves_the_arm_safe(row, tmp_path):
+def test_computer_faults_leave_the_arm_safe(row, tmp_path):
     row.check(tmp_path)

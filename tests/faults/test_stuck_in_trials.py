@@ -27,9 +27,7 @@ def config(tmp_path_factory):
         *(pytest.param(motor, 1.0, marks=pytest.mark.long) for motor in LEADING[1:]),
     ],
 )
-def test_a_frozen_motor_ends_a_trial_before_the_arm_is_fast(
-    config, tmp_path, motor, friction
-):
+def test_a_frozen_motor_ends_a_trial_at_low_speed(config, tmp_path, motor, friction):
     strike = strike_of(f"stuck-motor-{motor}")
     seen = run_whole(strike, IN_MOTION, config, tmp_path / "data", friction)
     assert seen.done.code == 4
@@ -41,18 +39,14 @@ def test_a_frozen_motor_ends_a_trial_before_the_arm_is_fast(
 
 
 @pytest.mark.parametrize("friction", [0.02, 0.3, 1.0])
-def test_a_sound_arm_is_led_to_the_end_whatever_its_friction(
-    config, tmp_path, friction
-):
+def test_a_sound_arm_completes_a_trial_with_any_friction(config, tmp_path, friction):
     seen = run_whole(lambda _: None, IN_MOTION, config, tmp_path / "data", friction)
     assert (seen.done.code, seen.done.err) == (0, "")
     assert kept_and_sound(seen.folder) == ["T01"]
 
 
 @pytest.mark.parametrize("motor", STANDING)
-def test_a_frozen_motor_that_hardly_turns_in_a_trial_does_no_harm(
-    config, tmp_path, motor
-):
+def test_a_frozen_motor_that_hardly_turns_is_harmless(config, tmp_path, motor):
     """It is not noticed: neither bears weight, and both may stand in a trial.
 
     The lock does not feel joint 7 turn, so the ground turns the foot as it likes.

@@ -62,9 +62,7 @@ def test_the_twist_and_the_speed_are_those_of_the_sole(foot, foot_model, sample)
     assert speed == pytest.approx(np.linalg.norm(twist[:3]), abs=EXACT)
 
 
-def test_live_values_are_those_the_analysis_will_find(
-    foot, foot_model, payload, sample
-):
+def test_live_values_agree_with_the_analysis(foot, foot_model, payload, sample):
     foot.observe(reading(), wrench(), sample)
     _, rotation = foot_model.sole_pose(Q)
     contact = payload.contact(np.array(RAW), rotation)
@@ -95,7 +93,7 @@ def test_before_the_first_wrench_there_is_motion_and_no_force(foot, sample):
     assert np.isfinite(sample.foot_position).all()
 
 
-def test_a_tare_counts_from_the_next_cycle_on(foot, foot_model, payload, sample):
+def test_a_tare_takes_effect_in_the_next_cycle(foot, foot_model, payload, sample):
     _, rotation = foot_model.sole_pose(Q)
     foot.payload = payload.tared(np.array(RAW), rotation)
     foot.observe(reading(), wrench(), sample)

@@ -65,7 +65,7 @@ newtons = st.floats(-50, 50)
     bias=st.floats(-20, 20),
     force=st.tuples(newtons, newtons, newtons),
 )
-def test_the_ground_force_comes_back_from_the_reading(
+def test_the_ground_force_is_recovered_from_the_reading(
     example_tool, turns, psi, sign, bias, force
 ):
     tool = replace(example_tool, sensor_angle=psi, sensor_sign=sign)
@@ -75,7 +75,7 @@ def test_the_ground_force_comes_back_from_the_reading(
     assert np.allclose(payload.to_base(contact, R), force, atol=1e-11)
 
 
-def test_the_moment_that_is_left_is_that_of_the_ground_force(example_tool):
+def test_the_remaining_moment_is_that_of_the_ground_force(example_tool):
     force = np.array([3.0, -2.0, 12.0])
     payload = mounted(example_tool)
     R = attitude(0.1, np.pi - 0.2, 0.5)
@@ -84,7 +84,7 @@ def test_the_moment_that_is_left_is_that_of_the_ground_force(example_tool):
     assert np.allclose(contact[3:], np.cross(lever, R.T @ force), atol=EXACT)
 
 
-def test_a_foot_in_the_air_feels_nothing(example_tool):
+def test_a_foot_in_the_air_has_no_ground_force(example_tool):
     payload = mounted(example_tool, 0.3, -1.0, 2.0)
     tool = replace(example_tool, sensor_angle=0.3, sensor_sign=-1.0)
     R = attitude(0.3, 2.8, -0.7)
@@ -92,7 +92,7 @@ def test_a_foot_in_the_air_feels_nothing(example_tool):
     assert np.allclose(contact, 0.0, atol=EXACT)
 
 
-def test_the_example_of_a_hanging_foot(example_tool):
+def test_a_hanging_foot_has_the_worked_example_reading(example_tool):
     payload = mounted(example_tool)
     assert np.allclose(payload.weight(FOOT_DOWN)[:3], [0, 0, 4.4145], atol=EXACT)
     ground = np.array([0.0, 0.0, 2.943])
@@ -103,9 +103,7 @@ def test_the_example_of_a_hanging_foot(example_tool):
 @pytest.mark.parametrize("tilt_deg", [10.0, 15.0, 60.0])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("psi", [0.0, 0.8])
-def test_a_tare_at_one_angle_leaves_nothing_at_another(
-    example_tool, tilt_deg, sign, psi
-):
+def test_a_tare_at_one_angle_holds_at_another(example_tool, tilt_deg, sign, psi):
     tool = replace(example_tool, sensor_angle=psi, sensor_sign=sign)
     truth = mounted(tool, psi, sign, bias=1.7)
     in_air = reading(truth, FOOT_DOWN, np.zeros(3), tool)
@@ -117,7 +115,9 @@ def test_a_tare_at_one_angle_leaves_nothing_at_another(
 
 
 @pytest.mark.parametrize(("tilt_deg", "newton"), [(10.0, 0.77), (15.0, 1.15)])
-def test_without_the_weight_a_tare_would_leave_newtons(example_tool, tilt_deg, newton):
+def test_a_tare_without_weight_compensation_leaves_an_error(
+    example_tool, tilt_deg, newton
+):
     payload = mounted(example_tool)
     tilted = rotation(1, np.deg2rad(tilt_deg)) @ FOOT_DOWN
     left = payload.weight(tilted) - payload.weight(FOOT_DOWN)
@@ -131,7 +131,7 @@ def test_taring_changes_only_the_bias(example_tool):
     assert not np.array_equal(tared.bias, payload.bias)
 
 
-def test_a_recording_gives_the_same_as_sample_by_sample(example_tool):
+def test_a_recording_is_computed_as_sample_by_sample(example_tool):
     rng = np.random.default_rng(0)
     payload = mounted(example_tool, 0.4, -1.0, 0.3)
     raw = rng.normal(size=(20, 6))
@@ -151,7 +151,7 @@ def test_the_cross_matrix_is_the_cross_product(a, b):
     assert np.allclose(cross_matrix(a) @ b, np.cross(a, b), atol=EXACT)
 
 
-def test_the_payload_of_a_tool_is_its_foot_seen_from_the_sensor(example_tool):
+def test_the_payload_of_a_tool_is_its_foot_in_the_sensor_frame(example_tool):
     payload = payload_of(replace(example_tool, sensor_angle=np.pi / 2))
     assert payload.mass == example_tool.foot.mass
     assert np.allclose(payload.com, [0.0, -0.01, 0.05], atol=EXACT)
@@ -183,7 +183,7 @@ def test_axes_are_right_handed_and_turned_by_the_heading(incline_deg, heading):
 
 
 @pytest.mark.parametrize("incline_deg", INCLINES)
-def test_from_its_other_end_the_same_plane_is_crossed_the_other_way(incline_deg):
+def test_from_the_other_end_the_plane_is_crossed_in_reverse(incline_deg):
     frame = terrain(incline_deg, heading=0.6)
     back = frame.from_other_end()
     turned = np.diag([-1.0, -1.0, 1.0])
@@ -220,7 +220,7 @@ def test_displacement_grows_from_the_far_end_and_height_above_the_plane(
 @pytest.mark.parametrize("incline_deg", INCLINES)
 @pytest.mark.parametrize("heading", [0.0, 0.6])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_ordinary_slip_is_positive_in_all_three(
+def test_ordinary_slip_has_positive_velocity_and_forces(
     example_tool, incline_deg, heading, sign
 ):
     """From the sensor's bytes to the figure: the foot slides down the plate."""
@@ -235,12 +235,12 @@ def test_ordinary_slip_is_positive_in_all_three(
     assert np.allclose(found, [0.03, 5.0, 8.0], atol=EXACT)
 
 
-def test_bouncing_back_is_a_negative_velocity():
+def test_bounce_back_is_a_negative_velocity():
     axes = terrain(10.0).axes()
     assert traction(axes, -0.02 * axes[0], np.zeros(3))[0] == pytest.approx(-0.02)
 
 
-def test_sideways_motion_and_force_do_not_count():
+def test_sideways_motion_and_force_are_ignored():
     axes = terrain(15.0, 0.3).axes()
     found = traction(axes, axes[1] + axes[2], 7.0 * axes[1])
     assert np.allclose(found, 0.0, atol=EXACT)
@@ -256,7 +256,7 @@ def test_traction_of_a_recording_is_traction_of_its_samples():
         assert np.allclose(found[i], traction(axes, velocity[i], force[i]), atol=EXACT)
 
 
-def test_a_payload_without_mass_leaves_the_reading(example_tool):
+def test_a_massless_payload_leaves_the_reading_unchanged(example_tool):
     payload = Payload(0.0, np.zeros(3), np.eye(3), 1.0, np.zeros(6))
     raw = np.arange(6.0)
     assert np.array_equal(payload.contact(raw, FOOT_DOWN), raw)

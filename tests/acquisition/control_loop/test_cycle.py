@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.clock import PERIOD_NS
-from acquisition.control_loop.cycle import Cycle, CycleOutputs
+from acquisition.control_loop.cycle import CONTACT_FORCE, Cycle, CycleOutputs
 from acquisition.control_loop.details import MotionExcess
 from acquisition.control_loop.faults import (
     Action,
@@ -256,7 +256,7 @@ def test_every_cycle_gives_one_record_with_its_number_and_times(bench):
     assert record["ft_counter"] == 2
 
 
-def test_the_record_holds_what_the_arm_said(bench):
+def test_the_record_contains_the_arm_reading(bench):
     bench.arm.q, bench.arm.qd = np.linspace(0, 1, 7), np.linspace(-1, 0, 7)
     record = bench.run()
     assert record["position"].tolist() == bench.arm.q.tolist()
@@ -284,16 +284,16 @@ def test_the_record_holds_the_torque_as_sent(bench):
     assert has(record, Flag.TORQUE_CLIPPED)
 
 
-def test_torque_that_was_not_cut_is_not_flagged(bench):
+def test_unclipped_torque_is_not_flagged(bench):
     assert not has(bench.enter(ArmState.FLOAT), Flag.TORQUE_CLIPPED)
 
 
-def test_rounding_to_the_motors_unit_is_no_clipping(bench):
+def test_rounding_to_the_motor_unit_is_not_clipping(bench):
     bench.arm.clip = 1.0 - 0.049
     assert not has(bench.enter(ArmState.FLOAT), Flag.TORQUE_CLIPPED)
 
 
-def test_cuts_on_two_joints_do_not_cancel(bench):
+def test_clipping_on_two_joints_does_not_cancel(bench):
     bench.arm.send = lambda tau, _: tau + np.array([1.0, -1.0, 0, 0, 0, 0, 0])
     assert has(bench.enter(ArmState.FLOAT), Flag.TORQUE_CLIPPED)
 
@@ -354,7 +354,7 @@ def test_a_stale_force_repeats_the_last_value_and_clears_the_bit(bench):
 
 
 @pytest.mark.parametrize(("cycles", "is_fresh"), [(3, True), (4, False)])
-def test_a_force_is_stale_after_six_milliseconds(bench, cycles, is_fresh):
+def test_a_force_is_stale_beyond_its_maximum_age(bench, cycles, is_fresh):
     bench.run(force=5.0)
     assert has(bench.run(cycles, force=None), Flag.FT_FRESH) is is_fresh
 
@@ -366,14 +366,14 @@ def test_there_is_no_force_before_the_first_sample(bench):
     assert not has(record, Flag.FT_FRESH)
 
 
-def test_of_several_samples_the_newest_is_used_and_all_are_handed_on(bench):
+def test_the_newest_of_several_samples_is_used_and_all_are_passed_on(bench):
     bench.sensor.queue = [bench.wrench(1.0), bench.wrench(2.0)]
     record = bench.run(force=None)
     assert record["wrench_raw"][2] == 2.0
     assert [sample.wrench[2] for sample in bench.wrenches] == [1.0, 2.0]
 
 
-def test_a_sample_the_device_does_not_vouch_for_is_not_used(bench):
+def test_an_invalid_sample_is_not_used(bench):
     good, bad = bench.wrench(1.0), bench.wrench(9.0, is_valid=False)
     bench.sensor.queue = [good, bad]
     record = bench.run(force=None)
@@ -397,7 +397,9 @@ def test_saturation_is_flagged(bench):
     assert has(bench.run(force=None), Flag.FT_SATURATED)
 
 
-@pytest.mark.parametrize(("force", "touches"), [(0.5, False), (0.51, True)])
+@pytest.mark.parametrize(
+    ("force", "touches"), [(CONTACT_FORCE, False), (1.01 * CONTACT_FORCE, True)]
+)
 def test_contact_is_flagged(bench, force, touches):
     assert has(bench.run(force=force), Flag.CONTACT) is touches
 
@@ -431,7 +433,7 @@ def test_a_simulated_arm_is_flagged(bench):
 
 
 @pytest.mark.parametrize("mode", SafetyMode)
-def test_a_sample_has_no_flags_but_its_own_unless_they_are_asked_for(bench, mode):
+def test_a_sample_has_only_its_own_flags_by_default(bench, mode):
     bench.arm.mode = mode
     usual = bench.run()["flags"]
     outputs = CycleOutputs(
@@ -463,7 +465,7 @@ def test_a_verdict_of_hold_ends_floating(bench):
     assert bench.reason == "joint7-slip"
 
 
-def test_a_verdict_ends_the_watch_on_the_trial(bench):
+def test_a_verdict_ends_the_trial_watch(bench):
     bench.enter(ArmState.FLOAT)
     bench.cycle.is_recording = True
     bench.law.offset = 0.06
@@ -471,7 +473,7 @@ def test_a_verdict_ends_the_watch_on_the_trial(bench):
     assert not bench.cycle.is_recording
 
 
-def test_a_silent_sensor_stops_a_trial_after_20_ms(bench):
+def test_a_silent_sensor_stops_a_trial_after_its_timeout(bench):
     bench.enter(ArmState.FLOAT)
     bench.cycle.is_recording = True
     bench.run(10, force=None)
@@ -480,7 +482,7 @@ def test_a_silent_sensor_stops_a_trial_after_20_ms(bench):
     assert (bench.state, bench.reason) == (ArmState.HOLD, "ft-stale")
 
 
-def test_a_sensor_that_never_spoke_stops_a_trial(bench):
+def test_a_sensor_that_never_sent_a_sample_stops_a_trial(bench):
     bench.cycle.request(ArmState.FLOAT)
     bench.cycle.is_recording = True
     bench.run(12, force=None)
@@ -510,7 +512,7 @@ def test_a_worse_fault_replaces_the_first(bench):
     assert (bench.state, bench.reason) == (ArmState.DAMP, "overspeed")
 
 
-def test_the_first_of_two_equal_faults_is_told(bench):
+def test_the_first_of_two_equal_faults_is_reported(bench):
     bench.enter(ArmState.FLOAT)
     bench.arm.qd = np.full(7, 1.6)
     bench.run()
@@ -561,7 +563,7 @@ def test_idle_in_the_middle_of_a_silence_is_recorded_as_zero_torque(bench):
     assert bench.run()["torque_command"].tolist() == [0.0] * 7
 
 
-def test_an_unconfirmed_idle_is_unknown_and_nothing_is_let_fall(bench):
+def test_an_unconfirmed_idle_is_unknown_and_keeps_the_torque(bench):
     bench.enter(ArmState.FLOAT)
     sent = len(bench.arm.sent)
     bench.arm.is_confirmed = False
@@ -622,7 +624,7 @@ def test_a_fault_of_the_safety_module_is_flagged_and_named_as_the_cause(bench):
     assert bench.cycle.status.verdict.detail == CircuitCauses(("velocity",))
 
 
-def test_what_the_guard_stops_itself_has_no_cause_in_the_module(bench):
+def test_a_stop_by_the_guard_has_no_module_cause(bench):
     bench.enter(ArmState.FLOAT)
     bench.arm.faults = ("heartbeat",)
     bench.arm.missing = 25
@@ -640,7 +642,7 @@ def test_an_unknown_arm_can_be_held_again(bench):
     assert bench.arm.sent[-1].tolist() == [2.0] * 7
 
 
-def test_torques_are_there_before_the_pendant_activates(bench):
+def test_torques_are_sent_before_activation_at_the_pendant(bench):
     bench.start()
     bench.run(10)
     assert (bench.state, bench.reason) == (ArmState.HOLD, "")
@@ -669,7 +671,7 @@ def fault(name):
     return verdict_for(Fault(name))
 
 
-def test_a_request_that_does_not_know_the_newest_verdict_is_refused(bench):
+def test_a_request_unaware_of_the_newest_verdict_is_refused(bench):
     bench.enter(ArmState.FLOAT)
     known = bench.cycle.status.number
     bench.cycle.report(fault("console-silent"))
@@ -682,7 +684,7 @@ def test_a_request_that_does_not_know_the_newest_verdict_is_refused(bench):
     assert (bench.state, bench.reason) == (ArmState.FLOAT, "")
 
 
-def test_a_request_that_waits_for_positions_is_refused_by_a_verdict_meanwhile(bench):
+def test_a_pending_request_is_refused_by_an_intervening_verdict(bench):
     bench.enter(ArmState.FLOAT)
     bench.arm.missing = 1
     bench.enter(ArmState.HOLD)
@@ -693,7 +695,7 @@ def test_a_request_that_waits_for_positions_is_refused_by_a_verdict_meanwhile(be
     assert (bench.state, bench.reason) == (ArmState.HOLD, "console-silent")
 
 
-def test_a_start_that_a_verdict_overtook_lets_no_torque_follow(bench):
+def test_a_start_overtaken_by_a_verdict_sends_no_torque(bench):
     bench.arm.mode = SafetyMode.IDLE
     bench.run()
     bench.arm.missing = 1
@@ -706,7 +708,7 @@ def test_a_start_that_a_verdict_overtook_lets_no_torque_follow(bench):
     assert (bench.state, bench.reason) == (ArmState.IDLE, "arm-not-active")
 
 
-def test_a_proof_that_was_idled_stays_so_beside_what_ends_the_session():
+def test_an_idling_verdict_stays_latched_after_a_later_one():
     status = ControlStatus()
     status.latch(replace(fault("console-silent"), action=Action.IDLE))
     status.latch(fault("can-silence"))
@@ -754,7 +756,7 @@ def test_the_status_shows_the_age_of_the_force(bench):
     assert bench.cycle.status.ft_age_ns == 3 * PERIOD_NS
 
 
-def test_a_sensor_whose_port_is_gone_is_a_silent_one(bench):
+def test_a_sensor_without_its_port_counts_as_silent(bench):
     def gone(now_ns):
         raise LinkError("The serial port of the F/T sensor failed.")
 
@@ -773,7 +775,7 @@ def test_a_sensor_whose_port_is_gone_is_a_silent_one(bench):
         (SafetyMode.E_STOP, ArmState.IDLE, "estop"),
     ],
 )
-def test_a_stop_is_told_before_the_arm_was_ever_active(bench, mode, state, reason):
+def test_a_stop_is_reported_before_the_first_activation(bench, mode, state, reason):
     bench.start()
     bench.arm.mode = mode
     bench.run()
@@ -797,7 +799,7 @@ def test_a_silent_safety_module_makes_the_arm_hold_at_once_and_idle_later(bench)
     assert bench.cycle.status.verdict.ends_session
 
 
-def test_a_request_does_not_end_the_watch_on_a_silent_module(bench):
+def test_a_request_does_not_reset_the_silence_of_a_module(bench):
     bench.enter(ArmState.HOLD)
     fall_silent(bench)
     bench.enter(ArmState.FLOAT)
@@ -810,14 +812,14 @@ def test_a_request_does_not_end_the_watch_on_a_silent_module(bench):
     )
 
 
-def test_torques_for_a_module_that_is_silent_from_the_start_are_idled(bench):
+def test_torques_with_a_module_silent_from_the_start_end_in_idle(bench):
     bench.arm.safety_heard_ns, bench.arm.mode = 0, SafetyMode.UNKNOWN
     bench.arm.is_confirmed = False
     bench.enter(ArmState.HOLD)
     assert (bench.state, bench.reason) == (ArmState.UNKNOWN, "safety-silent")
 
 
-def test_a_request_in_the_moment_of_the_pendants_idle_does_not_hide_it(bench):
+def test_a_simultaneous_request_does_not_hide_idle_at_the_pendant(bench):
     bench.enter(ArmState.HOLD)
     bench.arm.mode = SafetyMode.IDLE
     bench.enter(ArmState.FLOAT)
@@ -844,13 +846,13 @@ def test_torques_grow_from_zero_after_the_brakes(bench):
     assert bench.arm.sent[-1].tolist() == pytest.approx([3.0] * 6 + [9.0])
 
 
-def test_a_torque_that_was_held_back_is_flagged(bench):
+def test_a_slew_limited_torque_is_flagged(bench):
     bench.law.torques = dict.fromkeys(TORQUE, 9.0)
     assert has(bench.enter(ArmState.FLOAT), Flag.TORQUE_CLIPPED)
     assert not has(bench.run(3), Flag.TORQUE_CLIPPED)
 
 
-def test_an_unknown_arm_is_asked_for_no_position_until_torques_are_wanted(bench):
+def test_an_unknown_arm_is_not_polled_until_torques_are_requested(bench):
     bench.enter(ArmState.FLOAT)
     bench.arm.is_confirmed = False
     bench.enter(ArmState.IDLE)
@@ -879,7 +881,7 @@ def silent(bench, cycles):
         bench.run()
 
 
-def test_a_proof_of_the_heartbeat_asks_for_nothing_until_it_is_over(proved):
+def test_a_heartbeat_test_sends_no_requests_until_it_ends(proved):
     proved.cycle.prove(PoweredTestGoal(PoweredTestKind.SILENCE, seconds=0.1))
     proved.run()
     asked_ns = proved.arm.asked_ns
@@ -893,7 +895,7 @@ def test_a_proof_of_the_heartbeat_asks_for_nothing_until_it_is_over(proved):
     assert proved.reason == Fault.CAN_SILENCE
 
 
-def test_a_silence_that_was_wanted_hides_no_other_fault(proved):
+def test_an_intended_silence_hides_no_other_fault(proved):
     proved.cycle.prove(PoweredTestGoal(PoweredTestKind.SILENCE, seconds=0.1))
     proved.run()
     silent(proved, 10)
@@ -902,7 +904,7 @@ def test_a_silence_that_was_wanted_hides_no_other_fault(proved):
     assert proved.reason == Fault.E_STOP
 
 
-def test_a_request_ends_a_silence_that_was_wanted(proved):
+def test_a_request_ends_an_intended_silence(proved):
     proved.cycle.prove(PoweredTestGoal(PoweredTestKind.SILENCE, seconds=0.1))
     proved.run()
     asked_ns = proved.arm.asked_ns
@@ -939,7 +941,7 @@ class Loaded(Observer):
 
 
 @pytest.mark.parametrize("is_tared", [True, False])
-def test_a_load_is_judged_once_it_is_known(bench, is_tared):
+def test_a_load_is_judged_once_known(bench, is_tared):
     bench.observer = Loaded()
     bench.cycle = bench.make()
     bench.enter(ArmState.FLOAT)
@@ -960,7 +962,7 @@ def test_a_load_is_not_judged_from_a_force_that_is_not_fresh(bench):
     assert bench.reason == ""
 
 
-def test_of_two_equal_verdicts_the_guards_own_is_told(bench):
+def test_of_two_equal_verdicts_the_guards_own_is_reported(bench):
     bench.enter(ArmState.FLOAT)
     bench.cycle.is_recording = True
     bench.law.offset = 0.06
@@ -1008,7 +1010,7 @@ def proving():
     return bench
 
 
-def test_a_proof_goes_on_while_the_arm_does_what_it_should(proving):
+def test_a_powered_test_continues_while_the_arm_behaves(proving):
     proving.run(3)
     assert (proving.state, proving.reason) == (ArmState.HOLD, "")
     assert proving.law.powered[-1]
@@ -1017,14 +1019,14 @@ def test_a_proof_goes_on_while_the_arm_does_what_it_should(proving):
     assert not proving.law.powered[-1]
 
 
-def test_what_a_proof_should_not_do_ends_it_in_idle(proving):
+def test_an_excess_in_a_powered_test_ends_in_idle(proving):
     proving.law.excess = MotionExcess("the travel of joint 4", 0.03, 0.025, "rad")
     proving.run()
     assert (proving.state, proving.reason) == (ArmState.IDLE, Fault.PROOF_MOTION)
     assert proving.cycle.status.verdict.detail == proving.law.excess
 
 
-def test_what_the_guard_says_of_a_proof_goes_before_and_ends_it_in_idle(proving):
+def test_a_guard_verdict_takes_precedence_and_idles_a_powered_test(proving):
     proving.law.excess = MotionExcess("the travel of joint 4", 0.03, 0.025, "rad")
     proving.arm.missing = 5
     proving.run()

@@ -57,7 +57,7 @@ RECORDED_NAMES = {
 }
 
 
-def test_recorded_names_of_faults_stay_as_they_are():
+def test_recorded_fault_names_are_stable():
     assert {fault.value for fault in Fault} == RECORDED_NAMES
 
 
@@ -72,16 +72,16 @@ def test_a_fault_stops_the_arm_and_a_lasting_one_takes_no_less(fault):
 
 
 @pytest.mark.parametrize("fault", Fault)
-def test_a_session_goes_on_unless_the_arm_may_have_become_idle(fault):
+def test_a_session_continues_unless_the_arm_may_be_idle(fault):
     verdict = verdict_for(fault, is_lasting=True)
     assert verdict.ends_session is (verdict.action is Action.IDLE)
 
 
-def test_no_fault_has_no_reason_and_ends_no_session():
+def test_the_absence_of_a_fault_ends_no_session():
     assert (OK.reason, OK.ends_session, OK.severity) == ("", False, 0)
 
 
-def test_a_verdict_without_a_fault_survives_the_way_through_json():
+def test_a_verdict_without_a_fault_round_trips_through_json():
     assert from_plain(to_plain(OK)) == OK
 
 
@@ -94,11 +94,11 @@ def test_a_verdict_without_a_fault_survives_the_way_through_json():
     ],
     ids=lambda verdict: verdict.reason,
 )
-def test_a_verdict_survives_the_way_through_json_with_its_numbers(verdict):
+def test_a_verdict_round_trips_through_json(verdict):
     assert from_plain(json.loads(json.dumps(to_plain(verdict)))) == verdict
 
 
-def test_a_name_that_is_no_fault_is_refused():
+def test_an_unknown_fault_name_is_refused():
     with pytest.raises(ValueError, match="no-fault"):
         from_plain(["hold", "no-fault", {}])
 
@@ -107,6 +107,6 @@ def test_a_reason_is_the_recorded_name():
     assert GuardVerdict(Action.HOLD, Fault.FT_STALE).reason == "ft-stale"
 
 
-def test_actions_take_more_from_the_arm_one_after_the_other():
+def test_actions_are_ordered_by_severity():
     order = (Action.NONE, Action.END_TRIAL, Action.HOLD, Action.DAMP, Action.IDLE)
     assert [GuardVerdict(action).severity for action in order] == [0, 1, 2, 3, 4]

@@ -1,15 +1,17 @@
 from dataclasses import replace
+from itertools import pairwise
+from math import isinf
 from typing import Any
 
 import numpy as np
 import pytest
 
+from acquisition.clock import PERIOD_NS
 from acquisition.control_loop.faults import (
     OK,
     Action,
     Fault,
     ForceAge,
-    GuardVerdict,
     Joint7Slip,
     JointExcess,
     LateCycles,
@@ -90,6 +92,7 @@ def at(joint, value, n=7):
 
 
 def missing(cycles):
+    """Return changes to a reading; motor 6 has not answered for `cycles`."""
     return {"missing_cycles": cycles, "is_complete": False, "fresh": 0x5F}
 
 
@@ -102,58 +105,67 @@ def late(in_a_row):
 
 CHANGE = MotorChange(3, "PIDX", 3, 2)
 E = 1e-9
+TO_HOLD, TO_IDLE = LIMITS.hold_after_missing, LIMITS.idle_after_missing
+SILENT_NS = int(LIMITS.idle_after_safety_ms * MS)
+STALE_NS = int(LIMITS.ft_stop_ms * MS)
+SLIP = 1e-3 * LIMITS.joint7_mrad
+ACTIVE, BRAKED, UNKNOWN = SafetyMode.ACTIVE, SafetyMode.IDLE, SafetyMode.UNKNOWN
+
+
+def circuit(mode, age_ns=0):
+    return {"safety": mode, "safety_age_ns": age_ns}
+
+
 LIMIT_TABLE = [
+    # fault, action, what just may be, what may not
     (Fault.BUS_SHARED, Action.IDLE, {"foreign_id": None}, {"foreign_id": 0x404}),
-    (
-        Fault.E_STOP,
-        Action.IDLE,
-        {"safety": SafetyMode.ACTIVE},
-        {"safety": SafetyMode.E_STOP},
-    ),
-    (
-        Fault.PENDANT_IDLE,
-        Action.IDLE,
-        {"safety": SafetyMode.ACTIVE},
-        {"safety": SafetyMode.IDLE},
-    ),
+    (Fault.E_STOP, Action.IDLE, circuit(ACTIVE), circuit(SafetyMode.E_STOP)),
+    (Fault.PENDANT_IDLE, Action.IDLE, circuit(ACTIVE), circuit(BRAKED)),
     (
         Fault.SAFETY_SILENT,
         Action.HOLD,
-        {"safety": SafetyMode.ACTIVE, "safety_age_ns": 900 * MS},
-        {"safety": SafetyMode.UNKNOWN, "safety_age_ns": 400 * MS - 1},
+        circuit(ACTIVE, 2 * SILENT_NS),
+        circuit(UNKNOWN, SILENT_NS - 1),
     ),
     (
         Fault.SAFETY_SILENT,
         Action.IDLE,
-        {"safety": SafetyMode.ACTIVE, "safety_age_ns": 900 * MS},
-        {"safety": SafetyMode.UNKNOWN, "safety_age_ns": 400 * MS},
+        circuit(ACTIVE, 2 * SILENT_NS),
+        circuit(UNKNOWN, SILENT_NS),
     ),
-    (Fault.CAN_SILENCE, Action.HOLD, missing(4), missing(5)),
-    (Fault.CAN_SILENCE, Action.HOLD, missing(0), missing(24)),
-    (Fault.CAN_SILENCE, Action.IDLE, missing(0), missing(25)),
+    (Fault.CAN_SILENCE, Action.HOLD, missing(TO_HOLD - 1), missing(TO_HOLD)),
+    (Fault.CAN_SILENCE, Action.HOLD, missing(0), missing(TO_IDLE - 1)),
+    (Fault.CAN_SILENCE, Action.IDLE, missing(0), missing(TO_IDLE)),
     (Fault.REPLIES_LATE, Action.HOLD, {"late": None}, late(1)),
-    (Fault.REPLIES_LATE, Action.HOLD, {"late": None}, late(2)),
-    (Fault.REPLIES_LATE, Action.IDLE, {"late": None}, late(3)),
+    (
+        Fault.REPLIES_LATE,
+        Action.HOLD,
+        {"late": None},
+        late(LIMITS.idle_after_late - 1),
+    ),
+    (Fault.REPLIES_LATE, Action.IDLE, {"late": None}, late(LIMITS.idle_after_late)),
     (Fault.PUCK_CHANGED, Action.IDLE, {"change": None}, {"change": CHANGE}),
     (Fault.PUCK_DOUBLED, Action.IDLE, {"doubled": 0}, {"doubled": 3}),
-    (Fault.FOOT_SPEED, Action.DAMP, {"foot_speed": 0.8}, {"foot_speed": 0.8 + E}),
     (
-        Fault.JOINT7_SLIP,
-        Action.HOLD,
-        {"joint7_offset": 0.05},
-        {"joint7_offset": 0.05 + E},
+        Fault.FOOT_SPEED,
+        Action.DAMP,
+        {"foot_speed": LIMITS.foot_speed},
+        {"foot_speed": 1.01 * LIMITS.foot_speed},
     ),
-    (
-        Fault.JOINT7_SLIP,
-        Action.HOLD,
-        {"joint7_offset": -0.05},
-        {"joint7_offset": -0.05 - E},
+    *(
+        (
+            Fault.JOINT7_SLIP,
+            Action.HOLD,
+            {"joint7_offset": sign * SLIP},
+            {"joint7_offset": sign * 1.01 * SLIP},
+        )
+        for sign in (1, -1)
     ),
     (
         Fault.FT_STALE,
         Action.HOLD,
-        {"ft_age_ns": 20 * MS},
-        {"ft_age_ns": 20 * MS + 1},
+        {"ft_age_ns": STALE_NS},
+        {"ft_age_ns": STALE_NS + 1},
     ),
 ]
 
@@ -167,9 +179,9 @@ def test_every_limit_trips_just_outside_and_not_just_inside(
     assert (verdict.fault, verdict.action) == (fault, action)
 
 
-@pytest.mark.parametrize("joint", range(1, 8))
+@pytest.mark.parametrize("joint", [1, 4, 7])
 @pytest.mark.parametrize("side", ["lower", "upper"])
-def test_a_joint_may_reach_its_limit_and_not_pass_it(joint, side):
+def test_a_joint_may_reach_but_not_pass_its_limit(joint, side):
     limit = float(getattr(LIMITS, f"q_{side}")[joint - 1])
     beyond = limit + (E if side == "upper" else -E)
     assert judge(q=at(joint, limit)).action is Action.NONE
@@ -178,13 +190,14 @@ def test_a_joint_may_reach_its_limit_and_not_pass_it(joint, side):
     assert verdict.detail == JointExcess(joint, beyond, limit)
 
 
-@pytest.mark.parametrize("joint", range(1, 8))
-@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(("joint", "sign"), [(1, 1), (4, -1), (7, 1)])
 @pytest.mark.parametrize(
     ("field", "limits", "fault"),
     [("qd", LIMITS.speed, Fault.OVERSPEED), ("tau", LIMITS.torque, Fault.TORQUE_LIMIT)],
 )
-def test_a_joint_may_be_at_its_limit_of(joint, sign, field, limits, fault):
+def test_a_joint_may_have_but_not_exceed_its_limit_of(
+    joint, sign, field, limits, fault
+):
     limit = float(limits[joint - 1])
     assert judge(**{field: at(joint, sign * limit)}).action is Action.NONE
     verdict = judge(**{field: at(joint, sign * (limit + E))})
@@ -198,16 +211,20 @@ def test_a_quiet_cycle_passes():
     assert replace(state, rests=(), motion=None) == ARMED
 
 
-@pytest.mark.parametrize("field", ["q", "qd", "tau"])
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize("joint", [1, 7])
-def test_what_is_no_number_ends_in_idle(field, value, joint):
+@pytest.mark.parametrize(
+    ("field", "joint", "value"),
+    [
+        *(("q", 1, np.nan), ("qd", 7, np.nan), ("tau", 7, np.nan)),
+        *(("q", 7, np.inf), ("qd", 1, np.inf), ("tau", 1, -np.inf)),
+    ],
+)
+def test_a_quantity_that_is_not_a_number_ends_in_idle(field, joint, value):
     verdict = judge(**{field: at(joint, value)})
     assert (verdict.fault, verdict.action) == (Fault.NOT_A_NUMBER, Action.IDLE)
 
 
 @pytest.mark.parametrize("field", ["foot_speed", "joint7_offset"])
-def test_a_speed_or_offset_that_is_no_number_ends_in_idle(field):
+def test_a_speed_or_offset_that_is_not_a_number_ends_in_idle(field):
     assert judge(**{field: float("nan")}).fault == Fault.NOT_A_NUMBER
 
 
@@ -228,16 +245,11 @@ FAULTS = {
     Fault.JOINT7_SLIP: {"joint7_offset": 0.2},
     Fault.FT_STALE: {"ft_age_ns": S},
 }
-PAIRS = [
-    (worse, milder)
-    for i, worse in enumerate(FAULTS)
-    for milder in list(FAULTS)[i + 1 :]
-    if {worse, milder} != {Fault.NOT_A_NUMBER, Fault.TORQUE_LIMIT}  # both are in tau
-]
 
 
-@pytest.mark.parametrize(("worse", "milder"), PAIRS)
-def test_of_two_faults_the_more_severe_is_told(worse, milder):
+@pytest.mark.parametrize(("worse", "milder"), list(pairwise(FAULTS)))
+def test_the_more_severe_of_two_faults_is_reported(worse, milder):
+    """Of equally severe ones, the first in the order of the checks."""
     assert judge(**(FAULTS[milder] | FAULTS[worse])).fault == worse
 
 
@@ -247,12 +259,6 @@ def test_no_fault_hides_a_more_severe_one():
         assert judge(**both).action is Action.IDLE
 
 
-def test_damping_is_worse_than_holding_and_better_than_idle():
-    severities = [GuardVerdict(action).severity for action in Action]
-    assert severities == sorted(severities)
-    assert len(set(severities)) == len(Action)
-
-
 @pytest.mark.parametrize("name", FAULTS)
 def test_an_arm_that_is_not_powered_is_left_alone(name):
     idle = {"is_commanded": False, "is_recording": False}
@@ -260,7 +266,7 @@ def test_an_arm_that_is_not_powered_is_left_alone(name):
 
 
 @pytest.mark.parametrize("name", [Fault.JOINT7_SLIP, Fault.FT_STALE])
-def test_what_only_ends_a_trial_needs_a_trial(name):
+def test_trial_faults_need_a_trial(name):
     assert judge(**FAULTS[name], is_recording=False).action is Action.NONE
 
 
@@ -280,10 +286,17 @@ def test_home_on_the_stops_is_no_fault():
     assert state.armed == 0b1110101  # joints 2 and 4 stand on theirs
 
 
-@pytest.mark.parametrize(
-    ("value", "is_armed"), [(-1.9, False), (-1.9 + E, True), (1.9, False)]
+LOW, HIGH = (
+    LIMITS.q_lower[1] + LIMITS.armed_inside,
+    LIMITS.q_upper[1] - LIMITS.armed_inside,
 )
-def test_a_position_limit_is_armed_a_tenth_of_a_radian_inside(value, is_armed):
+
+
+@pytest.mark.parametrize(
+    ("value", "is_armed"),
+    [(LOW, False), (LOW + E, True), (HIGH - E, True), (HIGH, False)],
+)
+def test_a_position_limit_is_armed_inside_its_margin(value, is_armed):
     state, _ = check(LIMITS, GuardState(), seen(q=at(2, value)))
     assert bool(state.armed & 0b10) is is_armed
 
@@ -308,9 +321,10 @@ def test_an_extrapolated_position_arms_nothing():
 
 def test_only_joints_whose_limit_is_armed_are_judged():
     q = np.zeros(7)
-    q[1], q[2] = -2.01, 2.81
+    limit = LIMITS.q_upper[2]
+    q[1], q[2] = 1.01 * LIMITS.q_lower[1], 1.01 * limit
     _, verdict = check(LIMITS, GuardState(armed=0b1111101), seen(q=q))
-    assert verdict.detail == JointExcess(3, 2.81, 2.8)
+    assert verdict.detail == JointExcess(3, 1.01 * limit, limit)
 
 
 def late_cycles(times, state=ARMED):
@@ -322,55 +336,67 @@ def late_cycles(times, state=ARMED):
     return state, verdict
 
 
-def test_ten_late_cycles_in_a_second_are_tolerated():
-    assert late_cycles(range(0, 100 * MS, 10 * MS))[1].action is Action.NONE
+MOST = LIMITS.late_per_second
+TOLERATED = [i * 10 * MS for i in range(MOST)]
+TOO_MANY = [i * 10 * MS for i in range(MOST + 1)]
 
 
-def test_eleven_late_cycles_in_a_second_end_in_hold():
-    _, verdict = late_cycles(range(0, 110 * MS, 10 * MS))
+def test_late_cycles_up_to_the_limit_are_tolerated():
+    assert late_cycles(TOLERATED)[1].action is Action.NONE
+
+
+def test_late_cycles_beyond_the_limit_end_in_hold():
+    _, verdict = late_cycles(TOO_MANY)
     assert (verdict.fault, verdict.action) == (Fault.LOOP_LATE, Action.HOLD)
-    assert verdict.detail == LateCycles(11, 10)
+    assert verdict.detail == LateCycles(MOST + 1, MOST)
 
 
-def test_late_cycles_are_forgotten_after_a_second():
-    times = [*range(0, 100 * MS, 10 * MS), S + 1]
-    assert late_cycles(times)[1].action is Action.NONE
-    times = [*range(0, 100 * MS, 10 * MS), S]
-    assert late_cycles(times)[1].fault == Fault.LOOP_LATE
+def test_late_cycles_are_forgotten_after_the_window():
+    assert late_cycles([*TOLERATED, S + 1])[1].action is Action.NONE
+    assert late_cycles([*TOLERATED, S])[1].fault == Fault.LOOP_LATE
 
 
-def test_a_late_cycle_counts_for_a_second_to_the_nanosecond():
+def test_a_late_cycle_counts_for_exactly_the_window():
     """The oldest is forgotten, the next one is a second old."""
-    times = [*range(0, 110 * MS, 10 * MS), S + 10 * MS]
-    assert late_cycles(times)[1].detail == LateCycles(11, 10)
-    times[-1] += 1
-    assert late_cycles(times)[1] is OK
+    state, _ = late_cycles(TOO_MANY)
+    state, _ = check(LIMITS, state, seen(host_ns=S - 2 * MS))
+    at_end = seen(is_late=True, host_ns=S + 10 * MS)
+    assert check(LIMITS, state, at_end)[1].detail == LateCycles(MOST + 1, MOST)
+    beyond = seen(is_late=True, host_ns=S + 10 * MS + 1)
+    assert check(LIMITS, state, beyond)[1] is OK
 
 
-@pytest.mark.parametrize(("last_ms", "action"), [(149, "none"), (150, "idle")])
-def test_an_arm_is_idled_when_no_cycle_was_in_time_for_long(last_ms, action):
+LATE_NS = int(LIMITS.idle_after_late_ms * MS)
+
+
+@pytest.mark.parametrize(
+    ("last_ns", "action"), [(LATE_NS - 1, Action.NONE), (LATE_NS, Action.IDLE)]
+)
+def test_an_arm_is_idled_after_a_long_run_of_late_cycles(last_ns, action):
     state = ARMED
-    for t_ns in (S, S + 75 * MS, S + last_ms * MS):
+    for t_ns in (S, S + LATE_NS // 2, S + last_ns):
         state, verdict = check(LIMITS, state, seen(is_late=True, host_ns=t_ns))
-    assert verdict.action is Action(action)
+    assert verdict.action is action
 
 
-@pytest.mark.parametrize(("skipped", "action"), [(99, "none"), (100, "idle")])
-def test_an_arm_whose_loop_stood_still_is_idled(skipped, action):
-    verdict = judge(is_late=True, skipped=skipped)
-    assert verdict.action is Action(action)
+def test_an_arm_whose_loop_stalled_is_idled():
+    cycles = int(LIMITS.idle_after_gap_ms * MS) // PERIOD_NS
+    assert judge(is_late=True, skipped=cycles - 1) is OK
+    verdict = judge(is_late=True, skipped=cycles)
+    assert (verdict.fault, verdict.action) == (Fault.LOOP_LOST, Action.IDLE)
 
 
 def test_a_punctual_cycle_ends_a_run_of_late_ones():
     state = ARMED
-    for t_ns, is_late in ((S, True), (S + 149 * MS, False), (S + 151 * MS, True)):
+    cycles = ((S, True), (S + LATE_NS - MS, False), (S + LATE_NS + MS, True))
+    for t_ns, is_late in cycles:
         state, verdict = check(LIMITS, state, seen(is_late=is_late, host_ns=t_ns))
     assert verdict is OK
 
 
 def test_a_punctual_cycle_does_not_repeat_the_verdict():
-    state, _ = late_cycles(range(0, 110 * MS, 10 * MS))
-    _, verdict = check(LIMITS, state, seen(host_ns=112 * MS))
+    state, _ = late_cycles(TOO_MANY)
+    _, verdict = check(LIMITS, state, seen(host_ns=TOO_MANY[-1] + 2 * MS))
     assert verdict.action is Action.NONE
 
 
@@ -381,7 +407,7 @@ def test_the_memory_of_late_cycles_does_not_grow():
     assert state.late == ()
 
 
-def test_a_cycle_that_brings_nothing_new_makes_no_new_state():
+def test_a_cycle_without_new_data_keeps_the_state_object():
     state, _ = late_cycles([0])
     assert check(LIMITS, state, seen(host_ns=500 * MS))[0] is state
 
@@ -398,66 +424,67 @@ def led(steps, **changes):
 ONE_MOTOR = replace(LIMITS, still_travel=(9.0, 9.0, 9.0, 0.02, 9.0, 9.0, 9.0))
 
 
-def test_a_motor_that_stands_still_while_the_sole_goes_on_ends_the_session():
+def test_a_stuck_motor_while_the_sole_moves_ends_the_session():
     _, verdict = led([(100, 0.3), (100, 0.3201)])
     assert (verdict.fault, verdict.action) == (Fault.MOTOR_STILL, Action.IDLE)
     assert verdict.detail == StillMotor(4, pytest.approx(20.1), pytest.approx(20.0))
     assert verdict.ends_session
 
 
-def test_the_sole_may_go_as_far_as_the_limit():
+def test_the_sole_may_travel_up_to_the_limit():
     assert led([(100, 0.0), (100, 0.02)])[1] is OK
     assert led([(100, 0.0), (100, -0.02)])[1] is OK
 
 
-@pytest.mark.parametrize("motor", range(1, 8))
-def test_motors_2_to_6_may_stand_for_six_centimetres_each(motor):
-    """Motors 1 and 7 are judged never."""
-    verdicts: list[Any] = []
-    for way in (0.06, 0.061):
-        state = ARMED
-        for counts, x in ((0, 0.0), (100, way)):
-            turned = [counts] * 7
-            turned[motor - 1] = 0
-            now = seen(counts=turned, sole=(0.0, x, 0.0))
-            state, verdict = check(LIMITS, state, now)
-        verdicts.append(verdict)
-    assert verdicts[0] is OK
-    if motor in {1, 7}:
-        assert verdicts[1] is OK
-    else:
-        detail = StillMotor(motor, pytest.approx(61.0), pytest.approx(60.0))
-        assert verdicts[1].detail == detail
+def motor_at_rest(motor, travel):
+    """Judge a trial in which all motors but `motor` turn and the sole goes `travel`."""
+    state, verdict = ARMED, OK
+    for counts, x in ((0, 0.0), (100, travel)):
+        turned = [counts] * 7
+        turned[motor - 1] = 0
+        now = seen(counts=turned, sole=(0.0, x, 0.0))
+        state, verdict = check(LIMITS, state, now)
+    return verdict
+
+
+@pytest.mark.parametrize("motor", [2, 6])
+def test_leading_motors_may_stand_for_their_limit_of_travel(motor):
+    limit = LIMITS.still_travel[motor - 1]
+    assert motor_at_rest(motor, 0.99 * limit) is OK
+    detail = motor_at_rest(motor, 1.01 * limit).detail
+    assert detail == StillMotor(
+        motor, pytest.approx(1010.0 * limit), pytest.approx(1000.0 * limit)
+    )
 
 
 @pytest.mark.parametrize("counts", [99, 101])
-def test_a_flicker_of_one_count_is_no_motion(counts):
+def test_a_flicker_of_one_count_is_not_motion(counts):
     assert led([(100, 0.3), (counts, 0.31), (100, 0.3201)])[1].fault is not None
 
 
 @pytest.mark.parametrize("counts", [98, 102])
-def test_a_motor_that_turns_meanwhile_stands_not_still(counts):
+def test_a_motor_that_turns_meanwhile_is_not_stuck(counts):
     steps = [(100, 0.3), (counts, 0.319), (counts, 0.3389)]
     assert led(steps)[1] is OK
     assert led([*steps, (counts, 0.3391)])[1].fault is Fault.MOTOR_STILL
 
 
-def test_a_sole_that_stands_or_comes_back_judges_no_motor():
+def test_a_sole_at_rest_or_returning_flags_no_motor():
     assert led([(100, 0.3), (100, 0.3199), (100, 0.3), (100, 0.2801)])[1] is OK
 
 
-def test_a_motor_that_is_not_heard_is_not_said_to_stand_still():
+def test_a_silent_motor_is_not_reported_as_stuck():
     quiet = {"fresh": 0x77, "is_complete": False, "missing_cycles": 1}
     assert led([(100, 0.3), (100, 0.33)], **quiet)[1] is OK
 
 
-def test_between_trials_no_motor_is_said_to_stand_still():
+def test_no_motor_is_reported_as_stuck_between_trials():
     state, verdict = led([(100, 0.3), (100, 0.4)], is_recording=False)
     assert verdict is OK
     assert state.rests == ()
 
 
-def test_a_motor_at_rest_makes_no_new_state():
+def test_a_motor_at_rest_keeps_the_state_object():
     state, _ = led([(100, 0.3)])
     again = seen(counts=[0, 0, 0, 100, 0, 0, 0], sole=(0.31, 0.0, 0.0))
     assert check(ONE_MOTOR, state, again)[0] is state
@@ -475,43 +502,36 @@ def test_a_motor_of_a_sound_arm_may_stick():
     assert min(shares) > 1.5
 
 
-def test_motors_1_and_7_may_stand_for_a_whole_trial():
-    assert [way < 0.1 for way in LIMITS.still_travel] == [False, *[True] * 5, False]
+def test_only_motors_1_and_7_may_stand_for_a_whole_trial():
+    without = [i for i, travel in enumerate(LIMITS.still_travel, 1) if isinf(travel)]
+    assert without == [1, 7]
+    assert motor_at_rest(1, 1e3) is OK
+    assert motor_at_rest(7, 1e3) is OK
 
 
 @pytest.mark.parametrize("motor", [1, 7])
-def test_a_move_that_turns_a_motor_in_vain_is_braked(motor):
+def test_a_move_with_a_stuck_motor_is_braked(motor):
     verdict = judge(stuck_motor=motor, is_recording=False)
     assert (verdict.fault, verdict.action) == (Fault.MOTOR_STUCK, Action.IDLE)
     assert verdict.detail == StuckMotor(motor)
     assert verdict.ends_session
 
 
-def test_silence_tells_how_long_and_which_motors():
-    assert judge(**missing(5)).detail == ReplySilence(10.0, 0b0100000)
-    assert judge(**missing(25)).detail == ReplySilence(50.0, 0b0100000)
+def test_silence_is_reported_with_duration_and_motors():
+    silent_ms = TO_HOLD * PERIOD_NS / MS
+    assert judge(**missing(TO_HOLD)).detail == ReplySilence(silent_ms, 0b0100000)
 
 
 def test_details_are_in_the_units_of_the_message():
     stale = judge(ft_age_ns=26 * MS)
-    assert stale.detail == ForceAge(26.0, 20.0)
+    assert stale.detail == ForceAge(26.0, LIMITS.ft_stop_ms)
     slipped = judge(joint7_offset=-0.061)
     assert isinstance(slipped.detail, Joint7Slip)
     assert slipped.detail.mrad == pytest.approx(61.0)
-    assert slipped.detail.limit == pytest.approx(50.0)
+    assert slipped.detail.limit == LIMITS.joint7_mrad
 
 
-def test_severity_counts_what_is_taken_from_the_arm():
-    assert {action: GuardVerdict(action).severity for action in Action} == {
-        Action.NONE: 0,
-        Action.END_TRIAL: 1,
-        Action.HOLD: 2,
-        Action.DAMP: 3,
-        Action.IDLE: 4,
-    }
-
-
-def test_the_age_of_the_modules_last_answer_is_told():
+def test_the_age_of_the_modules_last_reply_is_reported():
     verdict = judge(safety=SafetyMode.UNKNOWN, safety_age_ns=250 * MS)
     assert verdict.detail == SafetySilence(250.0)
     assert verdict.ends_session
@@ -533,10 +553,7 @@ def after(*modes, is_commanded=True, **last):
     return verdict
 
 
-ACTIVE, BRAKED, UNKNOWN = SafetyMode.ACTIVE, SafetyMode.IDLE, SafetyMode.UNKNOWN
-
-
-def test_torques_made_ready_behind_confirmed_brakes_are_not_judged():
+def test_torques_prepared_behind_confirmed_brakes_are_not_judged():
     ready = {"is_starting": True, "is_recording": False}
     assert after(BRAKED, BRAKED, qd=at(1, 9.0), **ready) is OK
 
@@ -550,15 +567,15 @@ def test_an_arm_behind_brakes_is_neither_driven_nor_recorded(asked):
 
 
 @pytest.mark.parametrize("before", [ACTIVE, UNKNOWN])
-def test_brakes_after_a_state_that_may_drive_are_a_stop(before):
+def test_brakes_after_a_driving_state_are_a_stop(before):
     assert after(BRAKED, before, BRAKED).fault is Fault.PENDANT_IDLE
 
 
-def test_an_unknown_circuit_is_judged_from_the_first_command_on():
+def test_an_unknown_circuit_is_judged_from_the_first_command():
     assert after(UNKNOWN).fault is Fault.SAFETY_SILENT
 
 
-def test_a_new_begin_behind_confirmed_brakes_is_no_stop():
+def test_a_restart_behind_confirmed_brakes_is_not_a_stop():
     state = check(LIMITS, ARMED, seen(is_commanded=False))[0]
     starting = seen(safety=BRAKED, is_starting=True, is_recording=False)
     _, verdict = check(LIMITS, state, starting)
@@ -570,9 +587,12 @@ JUMP = PositionJump(motor=1, counts=990, speed=11.4)
 
 @pytest.mark.parametrize(
     ("cycles", "action"),
-    [(4, Action.NONE), (5, Action.HOLD), (24, Action.HOLD), (25, Action.IDLE)],
+    [
+        *((TO_HOLD - 1, Action.NONE), (TO_HOLD, Action.HOLD)),
+        *((TO_IDLE - 1, Action.HOLD), (TO_IDLE, Action.IDLE)),
+    ],
 )
-def test_positions_that_are_never_believed_are_a_fault_of_their_own(cycles, action):
+def test_permanently_rejected_positions_are_a_separate_fault(cycles, action):
     verdict = judge(**missing(cycles), jump=JUMP)
     assert verdict.action is action
     if action is not Action.NONE:
@@ -592,22 +612,22 @@ IDLE = {"is_commanded": False, "is_recording": False, "state": ArmState.IDLE}
 
 
 @pytest.mark.parametrize("before", [GuardState(), ARMED])
-def test_an_arm_that_nobody_asked_to_be_active_is_idled(before):
+def test_an_arm_activated_without_a_request_is_idled(before):
     verdict = check(LIMITS, before, seen(safety=SafetyMode.ACTIVE, **IDLE))[1]
     assert (verdict.fault, verdict.action) == (Fault.NOT_ASKED_ACTIVE, Action.IDLE)
 
 
 @pytest.mark.parametrize("safety", set(SafetyMode) - {SafetyMode.ACTIVE})
-def test_an_idle_arm_that_is_not_active_is_well(safety):
+def test_an_inactive_idle_arm_is_no_fault(safety):
     assert judge(safety=safety, **IDLE) is OK
 
 
-def test_an_arm_whose_idle_is_not_confirmed_is_not_idled_in_every_cycle():
+def test_an_unconfirmed_idle_is_not_repeated_in_every_cycle():
     unknown = {**IDLE, "state": ArmState.UNKNOWN}
     assert judge(safety=SafetyMode.ACTIVE, **unknown) is OK
 
 
-def test_another_master_is_told_before_the_arm_is_driven():
+def test_another_master_is_reported_before_the_arm_is_driven():
     verdict = judge(safety=SafetyMode.IDLE, foreign_id=0x404, **IDLE)
     assert verdict.fault is Fault.BUS_SHARED
 
@@ -619,7 +639,7 @@ def test_an_arm_that_runs_away_in_hold_is_idled():
     assert verdict.fault is Fault.HOLD_MOTION
 
 
-def test_a_braked_arm_begins_anew_when_it_gets_power():
+def test_a_braked_arm_restarts_its_limits_at_activation():
     moved = {"sole": (1.0, 0.0, 0.0), "state": ArmState.HOLD, "is_recording": False}
     state = check(LIMITS, ARMED, seen(state=ArmState.HOLD))[0]
     state = check(LIMITS, state, seen(safety=SafetyMode.IDLE, **moved))[0]

@@ -32,14 +32,14 @@ def work():
     return Work()
 
 
-def test_cycles_come_every_two_milliseconds(work):
+def test_cycles_run_at_the_nominal_period(work):
     work.loop.run(100)
     times = [tick.now_ns for tick in work.ticks]
     assert {b - a for a, b in itertools.pairwise(times)} == {2 * MS}
     assert work.numbers == list(range(100))
 
 
-def test_work_within_the_period_does_not_move_the_grid(work):
+def test_work_within_the_period_does_not_shift_the_grid(work):
     work.durations = dict.fromkeys(range(50), int(1.99 * MS))
     work.loop.run(50)
     deadlines = [tick.deadline_ns for tick in work.ticks]
@@ -47,14 +47,14 @@ def test_work_within_the_period_does_not_move_the_grid(work):
     assert work.loop.stats.late == 0
 
 
-def test_a_cycle_that_is_a_little_late_runs_and_is_not_counted(work):
+def test_a_slightly_late_cycle_runs_and_is_not_counted(work):
     work.durations = {3: int(2.5 * MS)}
     work.loop.run(6)
     assert work.numbers == [0, 1, 2, 3, 4, 5]
     assert work.loop.stats.late == 0
 
 
-def test_a_cycle_that_is_half_a_millisecond_late_is_counted(work):
+def test_a_cycle_late_by_the_limit_is_counted(work):
     work.durations = {3: int(2.5 * MS) + 1}
     work.loop.run(6)
     assert [tick.number for tick in work.ticks if tick.is_late] == [4]
@@ -86,7 +86,7 @@ def test_there_is_no_burst_after_a_stall(work):
     assert min(b - a for a, b in itertools.pairwise(after)) == 2 * MS
 
 
-def test_the_grid_stays_where_it_was_after_a_stall(work):
+def test_the_grid_is_unchanged_by_a_stall(work):
     work.durations = {3: 101 * MS}
     work.loop.run(70)
     first, last = work.ticks[0], work.ticks[-1]
@@ -99,14 +99,14 @@ def test_running_counts_periods_not_calls(work):
     assert work.numbers == [0, 10]
 
 
-def test_a_pause_that_was_not_announced_is_a_stall(work):
+def test_an_unannounced_pause_is_a_stall(work):
     work.loop.run(3)
     work.clock.sleep_until(work.clock.now_ns() + 1000 * MS)
     work.loop.step()
     assert work.loop.stats.skipped == 499
 
 
-def test_another_period_is_kept_too():
+def test_another_period_is_also_kept():
     clock = SteppedClock()
     times = []
     Loop(lambda tick: times.append(tick.now_ns), clock, period_ns=5 * MS).run(4)

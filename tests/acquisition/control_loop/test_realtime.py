@@ -26,7 +26,7 @@ def granting(monkeypatch):
     return asked
 
 
-def test_what_the_kernel_refuses_is_named_with_what_it_needs(refusing):
+def test_a_refused_kernel_request_is_named_with_its_requirement(refusing):
     grants = request(RealtimeRequest(priority=80, core=1, nice=5))
     assert [grant.is_granted for grant in grants] == [False] * 3
     assert [grant.what for grant in grants] == ["core 1", "SCHED_FIFO", "nice 5"]
@@ -34,7 +34,7 @@ def test_what_the_kernel_refuses_is_named_with_what_it_needs(refusing):
     assert "CAP_SYS_NICE" in grants[1].reason
 
 
-def test_everything_wished_is_asked_for(granting):
+def test_every_enabled_option_is_requested(granting):
     grants = request(RealtimeRequest(priority=80, core=1))
     assert [grant.is_granted for grant in grants] == [True, True]
     assert granting[0] == ("sched_setaffinity", (0, {1}))
@@ -43,7 +43,7 @@ def test_everything_wished_is_asked_for(granting):
     assert parameter.sched_priority == 80
 
 
-def test_no_wish_asks_for_nothing(granting):
+def test_no_enabled_option_requests_nothing(granting):
     assert request(RealtimeRequest()) == []
     assert granting == []
 
@@ -51,16 +51,12 @@ def test_no_wish_asks_for_nothing(granting):
 @pytest.mark.parametrize(
     ("allowed", "chosen"), [({0, 1}, (1, 0)), ({2, 5, 7}, (7, 2)), ({3}, (None, None))]
 )
-def test_the_loop_has_a_core_of_its_own_where_there_are_two(
-    monkeypatch, allowed, chosen
-):
+def test_the_loop_gets_its_own_core_if_there_are_several(monkeypatch, allowed, chosen):
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: allowed)
     assert choose_cores() == chosen
 
 
-def test_processors_are_kept_awake_by_a_descriptor_that_stays_open(
-    tmp_path, monkeypatch
-):
+def test_an_open_descriptor_keeps_processors_awake(tmp_path, monkeypatch):
     device = tmp_path / "cpu_dma_latency"
     device.write_bytes(b"")
     opened = []
@@ -81,7 +77,7 @@ def test_processors_are_kept_awake_by_a_descriptor_that_stays_open(
     os.close(descriptor)
 
 
-def test_sleep_that_may_not_be_forbidden_is_named_with_what_it_needs(monkeypatch):
+def test_a_refused_sleep_inhibition_is_named_with_its_requirement(monkeypatch):
     def refuse(*_):
         raise OSError(errno.EACCES, "Permission denied")
 
@@ -93,7 +89,7 @@ def test_sleep_that_may_not_be_forbidden_is_named_with_what_it_needs(monkeypatch
     assert "udev" in grant.reason
 
 
-def test_a_kernel_without_sleep_is_asked_for_nothing(monkeypatch, tmp_path):
+def test_a_kernel_without_sleep_states_needs_no_request(monkeypatch, tmp_path):
     monkeypatch.setattr(
         "acquisition.control_loop.realtime._LATENCY", tmp_path / "nothing"
     )

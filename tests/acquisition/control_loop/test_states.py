@@ -35,7 +35,7 @@ def letter(transition):
     return "." if transition.to is None else LETTERS[transition.to]
 
 
-def test_the_whole_table():
+def test_every_transition_follows_the_table():
     rows = [
         f"{event.value:<25} "
         + " ".join(letter(TRANSITIONS[state, event]) for state in ArmState)

@@ -18,7 +18,7 @@ def timings(count=1001):
     return records
 
 
-def test_each_time_is_measured_between_its_own_moments():
+def test_each_duration_is_measured_between_its_own_instants():
     report = loop_report(timings())
     assert report.rate == 500.0
     assert (report.cycles, report.missed) == (1001, 0)
@@ -43,7 +43,7 @@ def test_late_cycles_and_skipped_ones_count_as_missed():
     assert loop_report(records).missed == 3
 
 
-def test_cycles_without_all_replies_do_not_spoil_the_exchange():
+def test_incomplete_cycles_do_not_count_in_the_exchange_time():
     records = timings()
     records["replies_ns"][3] = 0
     records["sent_ns"][7] = records["sent_ns"][6]  # nothing was sent in this one
@@ -59,5 +59,5 @@ def test_an_arm_that_never_answered_has_no_exchange():
 
 
 @pytest.mark.parametrize("count", [0, 1])
-def test_too_few_cycles_say_nothing(count):
+def test_too_few_cycles_give_no_statistics(count):
     assert loop_report(timings()[:count]) is None

@@ -14,7 +14,7 @@ def ends():
     other.close()
 
 
-def test_a_hung_up_channel_says_so(ends):
+def test_a_closed_channel_is_reported(ends):
     one, other = ends
     other.close()
     with pytest.raises(ChannelClosedError):
@@ -31,7 +31,7 @@ def test_a_hung_up_channel_says_so(ends):
         struct.pack("<I", 10) + b"cut",
     ],
 )
-def test_nonsense_closes_the_channel(raw):
+def test_invalid_data_close_the_channel(raw):
     one, other = socket.socketpair()
     with one, other:
         one.sendall(raw)

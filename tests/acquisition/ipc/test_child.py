@@ -111,7 +111,7 @@ def child(shared):
     child.stop()
 
 
-def test_a_child_answers_and_knows_its_settings(child):
+def test_a_child_answers_and_has_its_settings(child):
     assert child.ask(AddNumbers(2, 3)) == 5
     assert child.ask(AskSettings()) == {"word": "go"}
 
@@ -142,12 +142,12 @@ def test_a_killed_child_is_named_with_its_signal(child):
     assert not child.is_alive
 
 
-def test_a_child_that_breaks_leaves_its_last_words(child):
+def test_a_crashed_child_leaves_its_last_output(child):
     with pytest.raises(ProcessLostError, match="ZeroDivisionError"):
         child.ask(BreakDown())
 
 
-def test_a_child_that_fails_at_once_says_why(shared):
+def test_a_child_that_fails_at_once_reports_its_cause(shared):
     child = Child("helper", f"{HERE}:failing", {"word": "nonsense"}, shared)
     with pytest.raises(ProcessLostError, match="told nonsense"):
         child.ask(AskSettings())
@@ -161,7 +161,7 @@ def test_stopping_ends_a_child_and_can_be_repeated(child):
     assert not child.is_alive
 
 
-def test_a_deaf_child_is_killed(shared):
+def test_an_unresponsive_child_is_killed(shared):
     child = Child("helper", f"{HERE}:deaf", {}, shared)
     child.stop()
     assert not child.is_alive

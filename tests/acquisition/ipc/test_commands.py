@@ -59,7 +59,7 @@ def test_every_command_has_its_example():
     assert {type(command) for command in COMMANDS} == {*get_args(Command)}
 
 
-def test_a_command_is_taken_once(shared):
+def test_a_command_is_consumed_once(shared):
     loop, console = CommandQueue(shared.commands), CommandQueue(shared.commands)
     console.post(LeaveLoop())
     assert len(loop.take()) == 1
@@ -72,7 +72,7 @@ def test_a_loop_that_begins_later_does_not_obey_old_commands(shared):
     assert CommandQueue(shared.commands).take() == []
 
 
-def test_numbers_go_on_when_a_console_comes_later(shared):
+def test_command_numbers_continue_with_a_later_console(shared):
     CommandQueue(shared.commands).post(LeaveLoop())
     console = CommandQueue(shared.commands)
     before = console.posted
@@ -97,13 +97,13 @@ def example(detail):
         ),
     ],
 )
-def test_the_status_arrives_as_it_was_written(shared, verdict):
+def test_the_status_round_trips(shared, verdict):
     control = ControlStatus(ArmState.HOLD, SafetyMode.ACTIVE, verdict, -5)
     status = LoopStatus(7, True, True, 1000, 3, 12, 9_000_000, control)
     StatusSlot(shared.status).write(status)
     assert StatusSlot(shared.status).read() == status
 
 
-def test_before_the_loop_runs_the_arm_is_idle_and_nothing_runs():
+def test_before_the_loop_runs_the_status_is_idle():
     status = StatusSlot(SharedLayout.create().status).read()
     assert (status.control.state, status.is_running) == (ArmState.IDLE, False)

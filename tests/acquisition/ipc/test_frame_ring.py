@@ -32,7 +32,7 @@ def times(frames):
     return frames["t_ns"].tolist()
 
 
-def test_the_last_two_seconds_are_found(buffer):
+def test_the_default_span_is_returned(buffer):
     tape_of(buffer, (0, S, 3 * S - 1, 3 * S, 5 * S))
     assert times(last_frames(buffer)) == [3 * S, 5 * S]
 
@@ -42,7 +42,7 @@ def test_the_span_can_be_chosen(buffer):
     assert times(last_frames(buffer, 1.0)) == [S, 2 * S]
 
 
-def test_a_frame_is_of_its_own_time_or_of_now_in_the_order_of_arrival(buffer):
+def test_a_frame_has_its_own_time_or_the_present_in_arrival_order(buffer):
     frames = [(0x423, b"\x01\x02\x03", S - 9), (0x443, b"", 0), (1, bytes(8), 8)]
     FrameRing(buffer, clock_at(S)).add(frames)
     kept = buffer.last(5)
@@ -51,11 +51,11 @@ def test_a_frame_is_of_its_own_time_or_of_now_in_the_order_of_arrival(buffer):
     assert times(kept) == [S - 9, S, 8]
 
 
-def test_an_empty_tape_gives_nothing(buffer):
+def test_an_empty_ring_gives_no_frames(buffer):
     assert len(last_frames(buffer)) == 0
 
 
-def test_the_tape_does_not_grow(buffer):
+def test_the_ring_does_not_grow(buffer):
     tape_of(buffer, range(50))
     assert times(last_frames(buffer)) == [45, 46, 47, 48, 49]
 

@@ -9,7 +9,7 @@ def memory():
     return memoryview(bytearray(LINE + 100))
 
 
-def test_a_slot_gives_the_newest_value_to_everyone_who_maps_it(memory):
+def test_a_slot_gives_its_newest_value_to_every_mapping(memory):
     writer, reader = Slot(memory), Slot(memory)
     writer.write(b"old and long")
     writer.write(b"new")
@@ -20,7 +20,7 @@ def test_a_slot_is_empty_before_its_first_value(memory):
     assert Slot(memory).read() == b""
 
 
-def test_every_value_has_a_version_of_its_own(memory):
+def test_every_value_has_its_own_version(memory):
     slot = Slot(memory)
     versions = set()
     for value in (b"a", b"a", b"b"):
@@ -36,7 +36,7 @@ def test_a_value_that_is_being_written_is_not_read(memory):
     assert slot.read() == b""
 
 
-def test_what_does_not_fit_is_refused_and_the_old_value_stays(memory):
+def test_an_oversized_value_is_refused_and_the_old_one_kept(memory):
     slot = Slot(memory)
     slot.write(b"x" * 100)
     with pytest.raises(ValueError, match="101 bytes"):

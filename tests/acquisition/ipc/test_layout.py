@@ -13,7 +13,7 @@ finite = st.floats(allow_nan=False)
 SHARED = SharedLayout.create()
 
 
-def test_two_who_map_the_same_memory_see_the_same():
+def test_two_mappings_of_the_same_memory_agree():
     one = SharedLayout.create()
     other = SharedLayout(SharedMemory(one.memory.descriptor))
     payload = (bytes(range(256)) * 3)[: CYCLE.size]
@@ -55,13 +55,15 @@ def test_areas_do_not_overlap():
     st.booleans(),
     st.integers(0, 63),
 )
-def test_a_sample_survives_the_ring(t_ns, counter, wrench, status, valid, saturated):
+def test_a_sample_round_trips_through_the_ring(
+    t_ns, counter, wrench, status, valid, saturated
+):
     sample = WrenchSample(t_ns, counter, wrench, status, valid, saturated)
     buffer = SHARED.wrenches
     buffer.write(pack_wrench(sample))
     assert unpack_wrenches(buffer.last(1)) == [sample]
 
 
-def test_the_memory_has_no_name_that_could_be_left_behind():
+def test_the_memory_has_no_name_to_leave_behind():
     descriptor = SHARED.memory.descriptor
     assert "memfd" in str(Path(f"/proc/self/fd/{descriptor}").readlink())

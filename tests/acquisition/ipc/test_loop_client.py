@@ -50,7 +50,7 @@ def room():
     return Room()
 
 
-def test_time_passes_in_portions_and_the_console_beats_in_each(room):
+def test_time_passes_in_slices_with_a_console_heartbeat_in_each(room):
     room.loop_client.advance(0.05)
     assert room.passed == [10, 10, 5]
     beat_ns = room.shared.heartbeats.last_ns(ProcessRole.CONSOLE)
@@ -62,13 +62,13 @@ def test_at_least_one_cycle_passes(room):
     assert room.passed == [1]
 
 
-def test_a_state_that_was_asked_for_is_seen(room):
+def test_a_requested_state_is_reported(room):
     room.loop_client.request(ArmState.FLOAT)
     room.loop_client.advance(0.02)
     assert room.loop_client.status.state is ArmState.FLOAT
 
 
-def test_a_verdict_from_before_the_request_is_not_believed(room):
+def test_a_verdict_from_before_the_request_is_ignored(room):
     room.status.control = ControlStatus(ArmState.HOLD, verdict=STOPPED)
     room.loop_client.advance(0.02)
     assert room.loop_client.status.verdict == STOPPED
@@ -83,7 +83,7 @@ def test_idle_is_confirmed_by_the_loop(room):
     assert room.loop_client.status.state is ArmState.IDLE
 
 
-def test_idle_without_an_answer_is_not_confirmed(room):
+def test_idle_without_a_reply_is_not_confirmed(room):
     room.status.control = ControlStatus(ArmState.FLOAT)
     room.loop_client.advance(0.02)
     room.is_obeying = False
@@ -93,7 +93,7 @@ def test_idle_without_an_answer_is_not_confirmed(room):
     assert room.clock.now_ns() - start_ns <= 520_000_000
 
 
-def test_observers_look_after_every_portion(room):
+def test_observers_run_after_every_slice(room):
     looks = []
     room.loop_client.on_tick.append(lambda: looks.append(room.clock.now_ns()))
     room.loop_client.advance(0.04)

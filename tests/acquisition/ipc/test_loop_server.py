@@ -112,14 +112,14 @@ def test_commands_reach_the_cycle_and_are_confirmed(loop):
     assert StatusSlot(loop.shared.status).read().obeyed == number
 
 
-def test_proofs_reach_the_cycle(loop):
+def test_powered_tests_reach_the_cycle(loop):
     ramp = PoweredTestGoal(PoweredTestKind.RAMP, 3, 0.5, 2.0)
     loop.console.post(StartPoweredTest(ramp))
     loop.run(0.002)
     assert loop.cycle.goals == [ramp]
 
 
-def test_the_loop_ends_when_it_is_told_to_leave(loop):
+def test_the_loop_ends_on_command(loop):
     loop.run(0.01)
     assert not loop.loop_server.is_over
     loop.console.post(LeaveLoop())
@@ -127,20 +127,20 @@ def test_the_loop_ends_when_it_is_told_to_leave(loop):
     assert loop.loop_server.is_over
 
 
-def test_the_end_of_the_loop_can_be_seen(loop):
+def test_the_end_of_the_loop_is_visible(loop):
     loop.run(0.01)
     assert StatusSlot(loop.shared.status).read().is_running
     loop.loop_server.leave()
     assert not StatusSlot(loop.shared.status).read().is_running
 
 
-def test_a_beating_console_and_recorder_leave_the_arm_alone(loop):
+def test_heartbeats_of_console_and_recorder_cause_no_verdict(loop):
     loop.cycle.is_recording = True
     loop.run(3.0)
     assert loop.cycle.reports == []
 
 
-def test_a_silent_console_makes_the_arm_hold_within_half_a_second(loop):
+def test_a_silent_console_makes_the_arm_hold_after_its_timeout(loop):
     loop.run(0.1)
     loop.run(0.5, beating=())
     assert loop.cycle.reports == []
@@ -149,7 +149,7 @@ def test_a_silent_console_makes_the_arm_hold_within_half_a_second(loop):
     assert {verdict.action for verdict in loop.cycle.reports} == {Action.HOLD}
 
 
-def test_a_console_that_comes_back_is_believed(loop):
+def test_a_returning_console_is_accepted(loop):
     loop.run(0.1)
     loop.run(0.6, beating=())
     loop.cycle.reports.clear()
@@ -157,7 +157,7 @@ def test_a_console_that_comes_back_is_believed(loop):
     assert loop.cycle.reports == []
 
 
-def test_an_arm_left_alone_for_a_minute_rings_every_second(loop):
+def test_an_unattended_arm_rings_the_bell_repeatedly(loop):
     loop.run(0.1)
     loop.run(59.9, beating=())
     assert loop.signals == 0
@@ -175,7 +175,7 @@ def test_a_silent_recorder_stops_a_trial_only(loop):
     assert loop.reasons() == {"recorder-silent"}
 
 
-def test_an_orphaned_arm_holds_at_once_and_brakes_after_a_second(loop):
+def test_an_orphaned_arm_holds_at_once_and_idles_later(loop):
     loop.run(0.1)
     loop.loop_server.orphan()
     loop.run(0.002)
@@ -187,7 +187,7 @@ def test_an_orphaned_arm_holds_at_once_and_brakes_after_a_second(loop):
     assert loop.loop_server.is_over
 
 
-def test_the_loop_shows_that_it_is_alive_and_when_what_happened(loop):
+def test_the_loop_publishes_its_heartbeat_and_event_times(loop):
     loop.run(0.004)
     assert loop.shared.heartbeats.last_ns(ProcessRole.CONTROL) == START_NS + PERIOD_NS
     (first, second) = loop.shared.timings.last(2)
@@ -196,7 +196,7 @@ def test_the_loop_shows_that_it_is_alive_and_when_what_happened(loop):
     assert int(second["sent_ns"]) == Arm.sent_ns
 
 
-def test_what_the_devices_say_is_published_once_a_second(loop):
+def test_device_status_is_published_periodically(loop):
     loop.run(0.002)
     version = loop.shared.health.version
     assert json.loads(loop.shared.health.read()) == {"puck": "warm"}
@@ -206,7 +206,7 @@ def test_what_the_devices_say_is_published_once_a_second(loop):
     assert loop.shared.health.version != version
 
 
-def test_the_bell_rings_first_when_a_minute_has_passed(loop):
+def test_the_bell_first_rings_after_the_unattended_time(loop):
     loop.run(0.1)
     loop.run(60.0, beating=())
     before = loop.signals
@@ -214,7 +214,7 @@ def test_the_bell_rings_first_when_a_minute_has_passed(loop):
     assert (before, loop.signals) == (0, 1)
 
 
-def test_what_the_devices_say_is_published_as_a_trial_begins(loop):
+def test_device_status_is_published_at_the_start_of_a_trial(loop):
     loop.run(0.1)
     version = loop.shared.health.version
     loop.console.post(WatchTrial(True))

@@ -10,7 +10,7 @@ from acquisition.ipc.shared_memory import SharedMemory, require_ordered_stores
 
 
 @pytest.mark.parametrize("machine", ["x86_64", "AMD64", "i386", "i686"])
-def test_an_x86_keeps_the_order(machine, monkeypatch):
+def test_an_x86_orders_stores(machine, monkeypatch):
     monkeypatch.setattr(platform, "machine", lambda: machine)
     require_ordered_stores()
 

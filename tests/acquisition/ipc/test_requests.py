@@ -140,17 +140,17 @@ def far(device):
     far.close()
 
 
-def test_a_request_is_answered_by_what_its_function_returns(far):
+def test_a_request_is_answered_with_its_functions_result(far):
     assert far.ask(Add(1, 2)) == 3
     assert far.ask(Add(1)) == 11
     assert far.ask(Add(b=1, a=5)) == 6
 
 
-def test_an_enum_comes_back_as_what_it_is(far):
+def test_an_enum_round_trips(far):
     assert far.ask(AskMode()) is Mode.ACTIVE
 
 
-def test_paths_and_nested_dataclasses_arrive_as_what_they_are(far):
+def test_paths_and_nested_dataclasses_round_trip(far):
     path = Path("/a/b c")
     report = far.ask(MakeReport(path, [0.1, 0.2]))
     assert report == Report(path, (Part("foot", (0.1, 0.2)),), Mode.IDLE)
@@ -161,12 +161,12 @@ def test_a_request_without_an_answer_gives_none(far, device):
     assert device.pressed == ["idle"]
 
 
-def test_what_is_sent_is_the_name_and_the_fields_as_plain_json(far):
+def test_a_request_is_sent_as_name_and_fields_in_plain_json(far):
     far.ask(Add(1, 2))
     assert far.sent == [["Add", {"a": 1, "b": 2}]]
 
 
-def test_a_thread_carries_out_its_own_requests_without_sending_them(device):
+def test_requests_within_one_thread_are_not_sent(device):
     dispatcher = Dispatcher(device.handlers())
     assert dispatcher.carry_out(Add(1, 2)) == 3
     with pytest.raises(RequestError, match="Unknown"):
@@ -210,12 +210,12 @@ def test_wrong_fields_are_refused_before_anything_happens(far, device, sent):
     assert device.pressed == []
 
 
-def test_an_unknown_request_is_said_to_be_one(far):
+def test_an_unknown_request_is_reported(far):
     with pytest.raises(RequestError, match="'Unknown' is not answered"):
         far.ask(Unknown())
 
 
-def test_an_answer_of_another_kind_is_not_taken(far, device):
+def test_an_answer_of_another_type_is_not_accepted(far, device):
     far.dispatcher = Dispatcher({Add: lambda a, b: f"{a} {b}"})
     with (
         pytest.warns(UserWarning, match="serialized"),
@@ -224,7 +224,7 @@ def test_an_answer_of_another_kind_is_not_taken(far, device):
         far.ask(Add(1, 2))
 
 
-def test_an_error_comes_back_as_what_it_was(device, far):
+def test_an_error_keeps_its_type(device, far):
     device.error = LinkError("down", hint="up", arm_state="idle", saved="all")
     with pytest.raises(LinkError) as caught:
         far.ask(Fail())
@@ -249,7 +249,7 @@ def test_an_error_of_an_unknown_kind_becomes_a_device_fault(device, far):
 
 
 @pytest.mark.parametrize("name", ["Path", "Exception", "nothing"])
-def test_a_name_that_is_no_error_of_ours_becomes_a_device_fault(name):
+def test_a_foreign_error_name_becomes_a_device_fault(name):
     near, far = Channel.pair()
     told = {"type": name, "message": "m", "hint": "", "arm_state": "", "saved": ""}
     far.send({"value": None, "error": told})
@@ -259,7 +259,7 @@ def test_a_name_that_is_no_error_of_ours_becomes_a_device_fault(name):
     far.close()
 
 
-def test_a_bug_of_the_other_side_is_not_hidden(device, far):
+def test_a_bug_on_the_other_side_is_not_hidden(device, far):
     device.error = ZeroDivisionError()
     with pytest.raises(ZeroDivisionError):
         far.ask(Fail())

@@ -33,7 +33,7 @@ def test_a_reader_gets_every_record_once_and_in_order(buffer):
     assert reader.lost == 0
 
 
-def test_records_come_out_bit_for_bit(buffer):
+def test_records_round_trip_bit_for_bit(buffer):
     reader = buffer.reader()
     cycles = make_cycles(12)
     write(buffer, cycles)
@@ -94,7 +94,7 @@ def test_the_latest_record_is_the_newest(buffer):
     assert numbers(buffer.last(1)) == [19]
 
 
-def test_what_was_read_does_not_change_afterwards(buffer):
+def test_records_read_do_not_change_afterwards(buffer):
     reader = buffer.reader()
     write(buffer, make_cycles(16, first=0))
     records = reader.read()

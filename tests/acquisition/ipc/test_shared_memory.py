@@ -11,7 +11,7 @@ def resident():
     return pages * 4096
 
 
-def test_memory_of_what_is_gone_goes_back_to_the_kernel():
+def test_memory_of_deleted_objects_is_returned_to_the_kernel():
     blocks = [bytes(1000) for _ in range(40_000)]
     blocks, pins = [], blocks[::40]  # what is left keeps the heap from shrinking
     held = resident()

@@ -100,7 +100,7 @@ def far(simulation, truth):
     far.far.close()
 
 
-def test_nothing_that_a_simulation_offers_is_left_out():
+def test_every_operation_of_a_simulation_is_exposed():
     offered = {
         name
         for owner in SimulationControl.__mro__
@@ -111,29 +111,29 @@ def test_nothing_that_a_simulation_offers_is_left_out():
 
 
 @pytest.mark.parametrize("name", CALLS)
-def test_what_is_called_from_afar_is_done(far, simulation, name):
+def test_remote_calls_are_carried_out(far, simulation, name):
     assert getattr(RemoteSimulation(far.ask), name)(*CALLS[name]) is None
     assert simulation.done == [(name, CALLS[name])]
 
 
 @pytest.mark.parametrize("name", QUESTIONS)
-def test_what_is_asked_from_afar_is_answered(far, name):
+def test_remote_queries_are_answered(far, name):
     value = getattr(RemoteSimulation(far.ask), name)
     assert (value() if callable(value) else value) == QUESTIONS[name]
 
 
-def test_positions_of_an_array_arrive_as_numbers(far, simulation):
+def test_arrays_of_positions_arrive_as_numbers(far, simulation):
     RemoteSimulation(far.ask).pose(np.arange(7.0), 1)
     assert simulation.done == [("pose", (list(range(7)), 1.0))]
 
 
-def test_the_truth_arrives_part_by_part_as_it_was(far, truth):
+def test_the_truth_arrives_unchanged_in_parts(far, truth):
     taken = RemoteSimulation(far.ask).take_truth()
     assert taken.dtype == TRUTH.dtype
     assert taken.tobytes() == truth.tobytes()
 
 
-def test_no_truth_is_no_record(simulation, truth):
+def test_an_empty_truth_has_no_records(simulation, truth):
     far = Loopback(simulation, truth[:0])
     assert RemoteSimulation(far.ask).take_truth().shape == (0,)
     far.near.close()

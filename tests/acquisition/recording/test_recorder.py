@@ -72,7 +72,7 @@ def flushes(monkeypatch):
     return seen
 
 
-def test_a_trial_begins_one_second_before_its_trigger(loop_client):
+def test_a_trial_begins_with_its_pre_roll(loop_client):
     loop_client.run(1200)
     loop_client.start()
     loop_client.run(300)
@@ -80,7 +80,7 @@ def test_a_trial_begins_one_second_before_its_trigger(loop_client):
     assert loop_client.numbers() == list(range(700, 1500))
 
 
-def test_a_young_loop_gives_what_pre_roll_it_has(loop_client):
+def test_a_young_loop_gives_the_pre_roll_it_has(loop_client):
     loop_client.run(40)
     loop_client.start()
     loop_client.run(10)
@@ -88,7 +88,7 @@ def test_a_young_loop_gives_what_pre_roll_it_has(loop_client):
     assert loop_client.numbers() == list(range(50))
 
 
-def test_a_second_trial_repeats_nothing_but_its_pre_roll(loop_client, tmp_path):
+def test_a_second_trial_repeats_only_its_pre_roll(loop_client, tmp_path):
     loop_client.start()
     loop_client.run(600)
     loop_client.recorder.finish("end")
@@ -133,7 +133,7 @@ def test_draining_writes_what_is_new(loop_client):
     assert verified.cycles == 17
 
 
-def test_forces_are_in_the_file_in_batches_of_20_ms(loop_client):
+def test_forces_are_written_in_batches(loop_client):
     loop_client.start()
     for _ in range(400):
         loop_client.clock.sleep_until(loop_client.clock.now_ns() + 1_250_000)
@@ -149,7 +149,7 @@ def test_draining_without_a_trial_does_nothing(loop_client):
     assert not loop_client.recorder.is_recording
 
 
-def test_the_file_is_forced_to_the_disk_every_quarter_second(loop_client, flushes):
+def test_the_file_is_synced_at_its_period(loop_client, flushes):
     loop_client.start()
     loop_client.run(500, drain_every=10)
     by_time = list(flushes)
@@ -165,7 +165,7 @@ def test_a_fast_drain_does_not_flush_more_often(loop_client, flushes):
     assert by_time == [125, 250, 375, 500]
 
 
-def test_what_the_ring_lost_is_in_the_result(loop_client):
+def test_losses_of_the_ring_are_in_the_result(loop_client):
     loop_client.start()
     slots = loop_client.buffer.slots
     loop_client.run(slots + 99)
@@ -199,7 +199,7 @@ def test_raw_frames_are_recorded_when_the_header_asks(loop_client):
     assert frames[:4].view("<u4").tolist() == [0x404]
 
 
-def test_a_drain_shows_that_the_recorder_is_alive(loop_client):
+def test_a_drain_is_a_heartbeat_of_the_recorder(loop_client):
     loop_client.run(10)
     loop_client.recorder.drain()
     assert (
@@ -224,7 +224,7 @@ def full_disk(monkeypatch):
     monkeypatch.setattr("os.fsync", full)
 
 
-def test_a_write_error_keeps_the_partial_and_is_told(loop_client, monkeypatch):
+def test_a_write_error_keeps_the_partial_file_and_is_reported(loop_client, monkeypatch):
     loop_client.start()
     loop_client.run(100, drain_every=10)
     full_disk(monkeypatch)
@@ -280,7 +280,7 @@ def test_abandoning_twice_does_nothing(loop_client):
     assert not loop_client.recorder.is_recording
 
 
-def test_what_was_measured_before_a_trial_is_abandoned_is_on_the_disk(loop_client):
+def test_data_from_before_an_abort_are_on_disk(loop_client):
     loop_client.start()
     loop_client.run(137)
     loop_client.recorder.abandon()

@@ -30,21 +30,23 @@ def test_a_folder_is_listed_in_order_by_a_pattern(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["missing", "T01.mcap"])
-def test_a_folder_that_is_not_there_holds_nothing(tmp_path, name):
+def test_a_missing_folder_is_empty(tmp_path, name):
     (tmp_path / "T01.mcap").touch()
     assert list_folder(tmp_path / name) == []
     assert list_folder(tmp_path / name / "below") == []
 
 
 @pytest.mark.parametrize("number", [errno.EIO, errno.EMFILE, errno.EACCES])
-def test_a_folder_that_cannot_be_listed_is_no_empty_one(tmp_path, monkeypatch, number):
+def test_an_unreadable_folder_is_not_taken_for_an_empty_one(
+    tmp_path, monkeypatch, number
+):
     monkeypatch.setattr(Path, "iterdir", broken(number))
     with pytest.raises(TrialFileError, match=os.strerror(number)):
         list_folder(tmp_path)
 
 
 @pytest.mark.parametrize("number", [errno.EIO, errno.EMFILE])
-def test_whether_a_recorder_writes_is_not_guessed(tmp_path, monkeypatch, number):
+def test_an_unknown_recorder_state_is_not_guessed(tmp_path, monkeypatch, number):
     assert not is_claimed(tmp_path)
     assert not is_claimed(tmp_path / "missing")
     monkeypatch.setattr(os, "open", broken(number))
@@ -52,6 +54,6 @@ def test_whether_a_recorder_writes_is_not_guessed(tmp_path, monkeypatch, number)
         is_claimed(tmp_path)
 
 
-def test_a_file_system_without_locks_claims_nothing(tmp_path, monkeypatch):
+def test_without_file_locks_no_writer_is_claimed(tmp_path, monkeypatch):
     monkeypatch.setattr(fcntl, "flock", broken(errno.ENOLCK))
     assert not is_claimed(tmp_path)

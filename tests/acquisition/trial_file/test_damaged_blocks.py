@@ -116,7 +116,7 @@ def judge(folder, name, data, rng):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["T01.mcap", "T01.mcap.partial"])
-def test_every_sound_chunk_is_saved(tmp_path, recordings, name):
+def test_every_sound_chunk_is_recovered(tmp_path, recordings, name):
     rng = np.random.default_rng(5)
     saved = [judge(tmp_path, name, recordings[name], rng) for _ in range(15)]
     assert all(saved)
@@ -125,14 +125,14 @@ def test_every_sound_chunk_is_saved(tmp_path, recordings, name):
 @pytest.mark.long
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("name", ["T01.mcap", "T01.mcap.partial"])
-def test_every_sound_chunk_of_three_hundred_is_saved(tmp_path, recordings, name):
+def test_every_sound_chunk_of_a_long_file_is_recovered(tmp_path, recordings, name):
     rng = np.random.default_rng(300)
     saved = [judge(tmp_path, name, recordings[name], rng) for _ in range(150)]
     assert sum(saved) >= 149
 
 
 @pytest.mark.parametrize("name", ["T01.mcap", "T01.mcap.partial"])
-def test_a_lost_first_chunk_defines_its_channels_all_the_same(
+def test_channels_are_recovered_when_the_first_chunk_is_lost(
     tmp_path, recordings, name
 ):
     data = bytearray(recordings[name])
@@ -146,7 +146,7 @@ def test_a_lost_first_chunk_defines_its_channels_all_the_same(
     assert [(loss.start, loss.seconds) for loss in recovery.losses] == [(0.0, 0.26)]
 
 
-def test_an_attachment_is_taken_from_a_file_that_holds_the_same(tmp_path, recordings):
+def test_an_attachment_is_taken_from_a_file_with_the_same_content(tmp_path, recordings):
     data = bytearray(recordings["T01.mcap"])
     data[span_of(bytes(data), ATTACHMENT).end - 10] ^= 1
     path = tmp_path / "T01.mcap"

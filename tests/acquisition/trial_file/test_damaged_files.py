@@ -73,12 +73,12 @@ def patched(data, at, form, value):
     [b"", b"\x89", b"hello, this is a text file\n" * 9, b"\x89MCAP0\r\n", bytes(999)],
     ids=["empty", "byte", "text", "magic", "zeros"],
 )
-def test_a_foreign_file_is_no_trial(put, content):
+def test_a_foreign_file_is_not_a_trial(put, content):
     with pytest.raises(TrialFileError, match="no MCAP file"):
         TrialReader(put(content))
 
 
-def test_two_magics_alone_are_no_trial(put):
+def test_two_magics_alone_are_not_a_trial(put):
     with pytest.raises(TrialFileError):
         TrialReader(put(b"\x89MCAP0\r\n" * 2))
 
@@ -88,17 +88,17 @@ def test_a_missing_file_is_named(tmp_path):
         TrialReader(tmp_path / "T99.mcap")
 
 
-def test_a_folder_is_no_trial(tmp_path):
+def test_a_folder_is_not_a_trial(tmp_path):
     with pytest.raises(TrialFileError):
         TrialReader(tmp_path)
 
 
-def test_another_profile_is_said(put):
+def test_another_profile_is_reported(put):
     with pytest.raises(TrialFileError, match="profile 'ros1'"):
         TrialReader(put(foreign("ros1")))
 
 
-def test_another_ros_recording_is_no_trial(put):
+def test_another_ros_recording_is_not_a_trial(put):
     with pytest.raises(TrialFileError, match="no trial of Traction"):
         TrialReader(put(foreign("ros2", "route")))
 
@@ -108,12 +108,12 @@ def test_a_file_without_checksums_is_refused(put):
         TrialReader(put(foreign("ros2", data_crcs=False)))
 
 
-def test_a_trial_without_cycles_says_so(put):
+def test_a_trial_without_cycles_is_reported_as_such(put):
     with pytest.raises(TrialFileError, match="no topic /cycle"):
         TrialReader(put(foreign("ros2"))).cycles()
 
 
-@pytest.mark.parametrize("share", np.linspace(0.0, 0.9999, 20))
+@pytest.mark.parametrize("share", np.linspace(0.0, 0.9999, 10))
 def test_a_truncated_file_is_refused(put, pristine, share):
     data = pristine[0]
     with pytest.raises(TrialFileError) as caught:
@@ -134,22 +134,22 @@ def test_a_file_that_lacks_its_last_bytes_is_refused(put, pristine, missing):
     [CHUNK, INDEX, ATTACHMENT, CHUNK_INDEX, STATISTICS, METADATA],
     ids=["chunk", "index", "attachment", "chunk-index", "statistics", "metadata"],
 )
-@pytest.mark.parametrize("bit", range(8))
-def test_a_flipped_bit_is_noticed(put, pristine, opcode, bit):
+@pytest.mark.parametrize("bit", [0, 7])
+def test_a_flipped_bit_is_detected(put, pristine, opcode, bit):
     data = pristine[0]
     span = span_of(data, opcode)
     with pytest.raises(TrialFileError):
         TrialReader(put(flipped(data, (span.body + span.end) // 2, bit)))
 
 
-def test_a_flipped_bit_in_a_name_of_the_summary_is_noticed(put, pristine):
+def test_a_flipped_bit_in_a_name_of_the_summary_is_detected(put, pristine):
     data = pristine[0]
     at = data.index(b"/joint_states", summary_start(data))
     with pytest.raises(TrialFileError, match="summary whose checksum"):
         TrialReader(put(flipped(data, at)))
 
 
-def test_a_flipped_bit_in_the_operators_name_is_noticed(put, pristine):
+def test_a_flipped_bit_in_the_operators_name_is_detected(put, pristine):
     data = pristine[0]
     with pytest.raises(TrialFileError, match="data whose checksum"):
         TrialReader(put(flipped(data, data.index(b"session") + 11)))
@@ -198,7 +198,7 @@ def index_tail(data):
     return 36 + offsets + 8
 
 
-def test_a_chunk_that_states_too_much_is_not_unpacked(put, pristine):
+def test_a_chunk_that_declares_too_large_a_size_is_not_unpacked(put, pristine):
     data = pristine[0]
     at = index_tail(data) + 4 + 4 + 8
     path = put(chunk_index_field(data, at, "<Q", RECORD_LIMIT + 1))
@@ -206,7 +206,7 @@ def test_a_chunk_that_states_too_much_is_not_unpacked(put, pristine):
         TrialReader(path).cycles()
 
 
-def test_chunks_that_state_a_petabyte_are_refused_at_once(put, pristine):
+def test_chunks_that_declare_an_absurd_size_are_refused_at_once(put, pristine):
     data = pristine[0]
     path = put(chunk_index_field(data, index_tail(data) + 16, "<Q", 2**50))
     with pytest.raises(TrialFileError, match="chunks of"):
@@ -224,7 +224,7 @@ def test_a_message_index_of_two_gigabytes_is_not_read(put, pristine):
 @pytest.mark.parametrize(
     ("back", "what"), [(8 + 29, "no footer"), (None, "no end of data")]
 )
-def test_section_ends_must_be_where_they_belong(put, pristine, back, what):
+def test_section_ends_must_be_in_their_positions(put, pristine, back, what):
     data = pristine[0]
     at = len(data) - back if back else summary_start(data) - 13
     with pytest.raises(TrialFileError, match=what):
@@ -284,7 +284,7 @@ def test_fewer_messages_than_announced_are_refused(put, pristine):
         TrialReader(put(resealed(changed))).cycles()
 
 
-def test_an_honest_hand_made_chunk_is_read(put):
+def test_a_valid_hand_made_chunk_is_read(put):
     raw = chunk_content()
     payload = zstandard.ZstdCompressor().compress(raw)
     rows = TrialReader(put(with_chunk(payload, len(raw)))).cycles()
@@ -300,7 +300,7 @@ def test_a_hand_made_chunk_of_every_compression_is_read(put, compression):
 
 @pytest.mark.parametrize("compression", ["", "lz4", "zstd"])
 @pytest.mark.parametrize("error", [-1, 1])
-def test_a_chunk_of_another_size_than_stated_is_refused(put, compression, error):
+def test_a_chunk_of_another_size_than_declared_is_refused(put, compression, error):
     raw = chunk_content(compression=compression)
     path = put(with_chunk(PACKERS[compression](raw), len(raw) + error, compression))
     with pytest.raises(TrialFileError):
@@ -309,7 +309,7 @@ def test_a_chunk_of_another_size_than_stated_is_refused(put, compression, error)
 
 @pytest.mark.parametrize("compression", ["", "lz4", "zstd"])
 @pytest.mark.parametrize("chunk_size", [700, 65_536])
-def test_every_compression_is_read_as_rosbags_reads_it(put, compression, chunk_size):
+def test_every_compression_is_read_as_by_rosbags(put, compression, chunk_size):
     data = packed_trial(make_cycles(200), compression, chunk_size=chunk_size)
     path = put(data)
     rows = TrialReader(path).cycles()
@@ -339,14 +339,14 @@ def test_a_pipe_is_not_waited_for(tmp_path):
         TrialReader(path)
 
 
-def test_a_file_beyond_all_size_is_not_read(put):
+def test_an_oversized_file_is_not_read(put):
     path = put(b"\x89MCAP0\r\n")
     os.truncate(path, size_limit(path) + 1)  # sparse: takes no room
     with pytest.raises(TrialFileError, match=f"{size_limit(path) + 1} bytes"):
         TrialReader(path)
 
 
-def test_a_frame_that_states_4_gib_is_not_unpacked(put):
+def test_a_frame_that_declares_an_excessive_size_is_not_unpacked(put):
     raw = bytearray(zstandard.ZstdCompressor().compress(chunk_content()))
     # a frame header that needs eight bytes for its content size: descriptor 0xC0
     bomb = bytes(raw[:4]) + b"\xc0\x58" + struct.pack("<Q", 4 * GIB) + raw[7:]
@@ -356,7 +356,7 @@ def test_a_frame_that_states_4_gib_is_not_unpacked(put):
         TrialReader(path).cycles()
 
 
-def test_a_frame_of_unknown_size_is_not_unpacked_beyond_what_is_stated(put):
+def test_a_frame_of_unknown_size_is_not_unpacked_beyond_the_declared_size(put):
     compressor = zstandard.ZstdCompressor(write_content_size=False)
     bomb = compressor.compress(bytes(32 * 2**20))
     path = put(with_chunk(bomb, len(chunk_content())))
@@ -364,7 +364,7 @@ def test_a_frame_of_unknown_size_is_not_unpacked_beyond_what_is_stated(put):
         TrialReader(path).cycles()
 
 
-def test_a_frame_of_unknown_size_that_is_honest_is_read(put):
+def test_a_valid_frame_of_unknown_size_is_read(put):
     raw = chunk_content()
     payload = zstandard.ZstdCompressor(write_content_size=False).compress(raw)
     assert len(TrialReader(put(with_chunk(payload, len(raw)))).cycles().data) == 1
@@ -384,7 +384,7 @@ def test_a_message_in_another_frame_is_not_misread(put):
         TrialReader(put(with_chunk(payload, len(raw)))).cycles()
 
 
-def test_a_wrong_chunk_checksum_is_noticed_even_when_the_file_is_sealed(put, pristine):
+def test_a_wrong_chunk_checksum_is_detected_even_if_the_file_is_sealed(put, pristine):
     data = pristine[0]
     at = span_of(data, CHUNK).body + 24
     path = put(resealed(flipped(data, at)))
@@ -412,7 +412,7 @@ def test_a_forged_file_raises_nothing_but_trial_file_errors(put, pristine, seed)
     assert set(refused) == {path}
 
 
-def test_the_mended_checksums_of_these_tests_are_right(pristine):
+def test_the_repaired_checksums_of_these_tests_are_right(pristine):
     data = pristine[0]
     assert resealed(data) == data
     assert (

@@ -25,7 +25,9 @@ def foreign(path, topics, *, profile="", crcs=True, compression=CompressionType.
 @pytest.mark.parametrize("profile", ["", "ros2"])
 @pytest.mark.parametrize("crcs", [True, False])
 @pytest.mark.parametrize("compression", [CompressionType.LZ4, CompressionType.NONE])
-def test_what_it_holds_is_said(tmp_path, profile, crcs, compression):
+def test_the_contents_of_a_foreign_file_are_reported(
+    tmp_path, profile, crcs, compression
+):
     path = foreign(
         tmp_path / "log.mcap",
         ["/imu", "/tf"],
@@ -44,7 +46,7 @@ def test_many_topics_are_counted(tmp_path):
     assert foreign_reason(path).endswith("/t0, /t1, /t2, /t3 and 5 more")
 
 
-def test_a_damaged_trial_keeps_its_own_reason(tmp_path):
+def test_a_damaged_trial_keeps_its_own_message(tmp_path):
     writer = write_trial(tmp_path / "T01.mcap", make_cycles(100))
     writer.close_partial()
     assert foreign_reason(writer.partial) == ""

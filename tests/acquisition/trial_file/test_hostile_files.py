@@ -188,7 +188,7 @@ def test_every_hostile_file_has_its_test(verdicts):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_hostile_file_is_refused_for_what_it_is_in_200_mb(verdicts, name):
+def test_a_hostile_file_is_refused_for_its_cause_in_bounded_memory(verdicts, name):
     pattern, said = verdicts[name]
     reason, seconds = said["read"]
     assert re.search(pattern, reason or "")
@@ -197,7 +197,7 @@ def test_a_hostile_file_is_refused_for_what_it_is_in_200_mb(verdicts, name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_recovering_a_hostile_file_takes_no_more(verdicts, name):
+def test_recovering_a_hostile_file_takes_bounded_memory(verdicts, name):
     reason, seconds = verdicts[name][1]["recover"]
     assert "MemoryError" not in (reason or "")
     assert seconds < SECONDS
@@ -282,7 +282,7 @@ def is_recovered(path, wanted):
     return True
 
 
-def test_a_mutated_file_is_refused_or_right(tmp_path, pristine):
+def test_a_mutated_file_is_refused_or_read_correctly(tmp_path, pristine):
     rng = np.random.default_rng(1)
     refused = survey(tmp_path / "T.mcap", mutated, pristine, rng, 300)
     assert refused > 290  # next to nothing in the file is without meaning
@@ -305,7 +305,7 @@ def recovered_share(path, pristine, rng, count):
     return recovered / count
 
 
-def test_what_is_recovered_of_a_mutated_file_is_right(tmp_path, pristine):
+def test_data_recovered_from_a_mutated_file_are_correct(tmp_path, pristine):
     rng = np.random.default_rng(7)
     # most of the file are chunks, and most of them have one before them
     assert recovered_share(tmp_path / "T.mcap", pristine, rng, 60) > 0.5
@@ -313,7 +313,7 @@ def test_what_is_recovered_of_a_mutated_file_is_right(tmp_path, pristine):
 
 @pytest.mark.long
 @pytest.mark.timeout(300)
-def test_two_thousand_mutated_files_are_refused_or_right(tmp_path, pristine):
+def test_many_mutated_files_are_refused_or_read_correctly(tmp_path, pristine):
     rng = np.random.default_rng(2000)
     assert survey(tmp_path / "T.mcap", mutated, pristine, rng, 2000) > 1900
     assert survey(tmp_path / "T.mcap", forged, pristine, rng, 2000) > 1000
@@ -321,12 +321,12 @@ def test_two_thousand_mutated_files_are_refused_or_right(tmp_path, pristine):
 
 @pytest.mark.long
 @pytest.mark.timeout(300)
-def test_what_is_recovered_of_two_thousand_is_right(tmp_path, pristine):
+def test_data_recovered_from_many_mutated_files_are_correct(tmp_path, pristine):
     rng = np.random.default_rng(2001)
     assert recovered_share(tmp_path / "T.mcap", pristine, rng, 2000) > 0.5
 
 
-def test_the_good_file_is_read_as_rosbags_reads_it(tmp_path, pristine):
+def test_the_valid_file_is_read_as_by_rosbags(tmp_path, pristine):
     path = tmp_path / "T.mcap"
     path.write_bytes(pristine[0])
     theirs = messages_of(path)["/cycle"]

@@ -63,14 +63,14 @@ def test_records_of_a_file_and_of_a_buffer_are_the_same(tmp_path):
         (b"", "the file ends without its end mark"),
     ],
 )
-def test_what_is_damaged_ends_a_file_behind_its_sound_records(tmp_path, tail, reason):
+def test_reading_ends_at_damage_after_the_sound_records(tmp_path, tail, reason):
     first = record(5, b"one")
     found, damage = scanned(tmp_path, first + tail)
     assert found == [(5, b"one", len(MAGIC) + len(first))]
     assert damage == reason
 
 
-def test_a_length_that_the_file_does_not_have_takes_no_memory(tmp_path):
+def test_a_length_beyond_the_file_allocates_no_memory(tmp_path):
     tracemalloc.start()
     try:
         scanned(tmp_path, record(5, b"abc", 900 * MIB), largest=1024 * MIB)
@@ -80,7 +80,7 @@ def test_a_length_that_the_file_does_not_have_takes_no_memory(tmp_path):
 
 
 @pytest.mark.parametrize("length", [4, 2**40, 2**64 - 1])
-def test_a_record_that_leads_out_of_its_buffer_is_none(length):
+def test_a_record_beyond_its_buffer_is_not_a_record(length):
     data = memoryview(record(5, b"abc") + record(5, b"abc", length))
     assert record_at(data, 0) is not None
     assert record_at(data, 12) is None
@@ -89,7 +89,7 @@ def test_a_record_that_leads_out_of_its_buffer_is_none(length):
 
 
 @pytest.mark.parametrize("offset", [24, 25, 2**63, 2**64 - 1])
-def test_there_is_no_record_behind_the_end(offset):
+def test_there_is_no_record_after_the_end(offset):
     data = memoryview(record(5, b"abc") * 2)
     assert record_at(data, offset) is None
     assert record_at(data, 23) is None  # a head that is cut
@@ -105,14 +105,14 @@ def metadata_body(values):
     return out.getvalue()[at + 9 :]
 
 
-def test_metadata_are_those_that_were_written():
+def test_metadata_round_trip():
     values = {"a": "1", "": "", "ü": "µ" * 300}
     body = memoryview(metadata_body(values))
     assert parse(Metadata, body) == Metadata(name="name", metadata=values)
 
 
 @pytest.mark.parametrize("at", [0, 8, 12])
-def test_metadata_whose_lengths_lie_are_damaged(at):
+def test_metadata_with_wrong_lengths_are_damaged(at):
     body = bytearray(metadata_body({"key": "value"}))
     for length in (1, 6, 200, 2**32 - 1):
         struct.pack_into("<I", body, at, length)

@@ -95,7 +95,7 @@ def salvaged_messages(data, path):
 # --- what is saved --------------------------------------------------------------------
 
 
-def test_a_file_cut_at_any_byte_of_its_last_chunk_keeps_all_before(tmp_path):
+def test_a_file_cut_in_its_last_chunk_keeps_all_earlier_ones(tmp_path):
     """Three chunks of two cycles each; the last one is cut everywhere."""
     data = partial_bytes(tmp_path, make_cycles(6), block=2)
     last = chunks(data)[-1]
@@ -111,7 +111,7 @@ def test_a_file_cut_at_any_byte_of_its_last_chunk_keeps_all_before(tmp_path):
     assert salvaged_messages(data[: last.end], tmp_path)[0] == whole
 
 
-def test_a_file_cut_anywhere_gives_its_whole_chunks_or_is_refused(put, left, cycles):
+def test_a_truncated_file_gives_its_complete_chunks_or_is_refused(put, left, cycles):
     ends = [span.end for span in chunks(left)]
     rng = np.random.default_rng(3)
     cuts = rng.integers(0, len(left), 40).tolist()
@@ -129,7 +129,7 @@ def test_a_file_cut_anywhere_gives_its_whole_chunks_or_is_refused(put, left, cyc
         recovery.path.unlink()
 
 
-def test_every_topic_is_saved_as_it_was(put, sealed, left):
+def test_every_topic_is_recovered_unchanged(put, sealed, left):
     theirs = messages_of(put(sealed, "T01.mcap"))
     saved = messages_of(recover_file(put(left)).path)
     assert saved.keys() == theirs.keys()
@@ -138,14 +138,14 @@ def test_every_topic_is_saved_as_it_was(put, sealed, left):
     assert len(saved["/cycle"]) == 300
 
 
-def test_what_was_known_before_the_trial_is_saved(put, left):
+def test_descriptions_from_before_the_trial_are_recovered(put, left):
     reader = TrialReader(recover_file(put(left)).path)
     assert reader.attachments == ATTACHMENTS
     assert reader.metadata["trial"]["session"] == "S"
     assert {"clock", "provenance", "channels"} <= reader.metadata.keys()
 
 
-def test_a_broken_chunk_costs_itself_alone(put, sealed, cycles):
+def test_a_damaged_chunk_costs_only_itself(put, sealed, cycles):
     third = chunks(sealed)[2]
     path = put(flipped(sealed, (third.body + third.end) // 2), "T01.mcap")
     recovery = recover_file(path)
@@ -159,7 +159,7 @@ def test_a_broken_chunk_costs_itself_alone(put, sealed, cycles):
     assert "chunk whose checksum" in recovery.reason or "decompress" in recovery.reason
 
 
-def test_a_chunk_that_passes_for_another_record_is_said_to_be_lost(put, sealed):
+def test_a_chunk_disguised_as_another_record_is_reported_lost(put, sealed):
     """Or its hole would look like cycles that were missed."""
     third = chunks(sealed)[2].start
     for opcode in (MESSAGE_INDEX, 1, 0x86, 99):
@@ -170,7 +170,7 @@ def test_a_chunk_that_passes_for_another_record_is_said_to_be_lost(put, sealed):
         assert recovery.losses == (LostSpan(0.204, 0.1),)
 
 
-def test_a_damaged_attachment_costs_itself_alone(put, sealed):
+def test_a_damaged_attachment_costs_only_itself(put, sealed):
     at = span_of(sealed, ATTACHMENT).end - 10
     recovery = recover_file(put(flipped(sealed, at), "T01.mcap"))
     reader = TrialReader(recovery.path)
@@ -179,7 +179,7 @@ def test_a_damaged_attachment_costs_itself_alone(put, sealed):
     assert reader.metadata["recovered"]["attachments_dropped"] == "config.toml"
 
 
-def test_a_lost_attachment_is_taken_from_a_file_beside_it(put, sealed):
+def test_a_lost_attachment_is_taken_from_a_neighbouring_file(put, sealed):
     put(sealed, "T02.mcap")
     at = span_of(sealed, ATTACHMENT).end - 10
     recovery = recover_file(put(flipped(sealed, at), "T01.mcap"))
@@ -188,7 +188,7 @@ def test_a_lost_attachment_is_taken_from_a_file_beside_it(put, sealed):
     assert reader.metadata["recovered"]["attachments_dropped"] == ""
 
 
-def test_another_attachment_of_the_same_name_is_not_taken(put, sealed, tmp_path):
+def test_a_different_attachment_of_the_same_name_is_not_taken(put, sealed, tmp_path):
     others = make_header(attachments={"config.toml": b"[rig]  # of another day"})
     seal(write_trial(tmp_path / "T00.mcap", make_cycles(100), others), "travel")
     at = span_of(sealed, ATTACHMENT).end - 10
@@ -197,7 +197,7 @@ def test_another_attachment_of_the_same_name_is_not_taken(put, sealed, tmp_path)
     assert "config.toml" not in TrialReader(recovery.path).attachments
 
 
-def test_a_description_that_stands_there_twice_is_copied_once(put, sealed):
+def test_a_duplicated_description_is_copied_once(put, sealed):
     first = span_of(sealed, METADATA)
     again = sealed[first.start : first.end]
     recovery = recover_file(
@@ -209,7 +209,7 @@ def test_a_description_that_stands_there_twice_is_copied_once(put, sealed):
     assert sum(name.startswith(again[13:17]) for name in names) == 1
 
 
-def test_a_lost_block_at_the_head_loses_nothing(put, sealed):
+def test_a_lost_block_at_the_head_loses_no_data(put, sealed):
     """What says which trial it is stands there a second time."""
     end = span_of(sealed, ATTACHMENT).start
     recovery = recover_file(put(bytes(end) + sealed[end:], "T01.mcap"))
@@ -222,7 +222,7 @@ def test_a_lost_block_at_the_head_loses_nothing(put, sealed):
 
 
 @pytest.mark.parametrize("reason", ["", "has a broken record"])
-def test_what_says_which_trial_it_is_cannot_be_done_without(put, sealed, reason):
+def test_a_file_without_its_trial_identity_is_refused(put, sealed, reason):
     names = [sealed[s.body + 4 : s.body + 9] for s in spans(sealed)]
     first, second = [
         s for s, name in zip(spans(sealed), names, strict=True) if name == b"trial"
@@ -256,7 +256,7 @@ def test_a_truth_file_is_recovered_too(tmp_path):
     assert len(TrialReader(recovery.path).truth().data) == 9
 
 
-def test_a_truth_file_whose_definitions_are_lost_is_known_by_its_messages(tmp_path):
+def test_a_truth_file_without_definitions_is_recognised_by_its_messages(tmp_path):
     records = np.frombuffer(bytearray(TRUTH.template * 9), TRUTH.dtype)
     records["host_ns"] = START_NS + np.arange(9)
     path = tmp_path / "T07.truth.mcap"
@@ -281,7 +281,7 @@ def test_a_truth_file_whose_definitions_are_lost_is_known_by_its_messages(tmp_pa
         ((b"key", b"value", b""), False),
     ],
 )
-def test_a_description_is_whole_or_proves_nothing(tmp_path, texts, is_sound):
+def test_an_incomplete_description_proves_nothing(tmp_path, texts, is_sound):
     """What was skipped ends at a description only if that one is whole."""
     pairs = b"".join(struct.pack("<I", len(text)) + text for text in texts)
     body = struct.pack("<I", 4) + b"name" + struct.pack("<I", len(pairs)) + pairs
@@ -290,7 +290,7 @@ def test_a_description_is_whole_or_proves_nothing(tmp_path, texts, is_sound):
     assert any(isinstance(r, Metadata) for r in found) is is_sound
 
 
-def test_a_chunk_that_is_gone_is_said_to_be_lost(put, sealed):
+def test_a_missing_chunk_is_reported_lost(put, sealed):
     third = chunks(sealed)[2]
     recovery = recover_file(
         put(sealed[: third.start] + sealed[third.end :], "T01.mcap")
@@ -299,7 +299,7 @@ def test_a_chunk_that_is_gone_is_said_to_be_lost(put, sealed):
     assert recovery.losses == (LostSpan(0.204, 0.1),)
 
 
-def test_a_chunk_that_stands_there_twice_is_taken_once(put, left):
+def test_a_duplicated_chunk_is_read_once(put, left):
     last = chunks(left)[-1]
     again = left[last.start : last.end]
     whole, _ = salvaged_messages(left, put(left))
@@ -309,13 +309,13 @@ def test_a_chunk_that_stands_there_twice_is_taken_once(put, left):
     assert salvage.lost_bytes == len(again)
 
 
-def test_a_zeroed_first_chunk_is_known_from_the_summary(put, sealed):
+def test_a_zeroed_first_chunk_is_detected_from_the_summary(put, sealed):
     first = chunks(sealed)[0]
     zeroed = sealed[: first.body] + bytes(first.end - first.body) + sealed[first.end :]
     assert recover_file(put(zeroed, "T01.mcap")).losses == (LostSpan(0.0, 0.104),)
 
 
-def test_a_description_that_is_damaged_is_doubted(put, sealed):
+def test_a_damaged_description_is_doubted(put, sealed):
     at = span_of(sealed, METADATA).end - 3
     recovery = recover_file(put(flipped(sealed, at, 2), "T01.mcap"))
     assert recovery.is_doubtful
@@ -337,7 +337,7 @@ def test_a_recovered_trial_is_readable_and_incomplete(put, left):
     assert verified.cycles == 300
 
 
-def test_it_says_what_it_was_made_from(put, left):
+def test_a_recovered_trial_names_its_source(put, left):
     cut = left[:-100]
     recovery = recover_file(put(cut))
     fields = TrialReader(recovery.path).metadata["recovered"]
@@ -349,7 +349,7 @@ def test_it_says_what_it_was_made_from(put, left):
     assert fields["reason"] == f"is cut off in the record at byte {kept}"
 
 
-def test_missed_and_late_cycles_are_counted_anew(put, tmp_path):
+def test_missed_and_late_cycles_are_recounted(put, tmp_path):
     late = make_cycles(100, skipped=(1050, 1051))
     late["flags"][::10] |= np.uint32(Flag.DEADLINE_MISSED)
     path = put(partial_bytes(tmp_path, late))
@@ -364,7 +364,7 @@ def test_missed_and_late_cycles_are_counted_anew(put, tmp_path):
     }
 
 
-def test_a_message_as_long_as_a_cycle_is_not_counted_as_one(put, left):
+def test_a_message_as_long_as_a_cycle_is_not_counted_as_a_cycle(put, left):
     channels = TrialReader(recover_file(put(left)).path).summary.channels
     other = next(n for n, known in channels.items() if known.topic != "/cycle")
     body = struct.pack("<HIQQ", other, 0, START_NS, START_NS) + CYCLE.template
@@ -374,7 +374,7 @@ def test_a_message_as_long_as_a_cycle_is_not_counted_as_one(put, left):
     assert TrialReader(recovery.path).metadata["result"]["cycles_written"] == "300"
 
 
-def test_what_was_lost_is_told_in_seconds(put, left):
+def test_losses_are_reported_in_seconds(put, left):
     """The head of the torn chunk still says how far it went."""
     last = chunks(left)[-1]
     recovery = recover_file(put(left[: last.end - 5]))
@@ -385,7 +385,7 @@ def test_what_was_lost_is_told_in_seconds(put, left):
     assert recovery.seconds_dropped == pytest.approx(0.1, abs=1e-6)
 
 
-def test_an_impossible_time_in_a_torn_chunk_is_not_believed(put, left):
+def test_an_implausible_time_in_a_torn_chunk_is_rejected(put, left):
     last = chunks(left)[-1]
     data = bytearray(left[: last.end - 5])
     struct.pack_into("<Q", data, last.body + 8, 2**63)
@@ -393,7 +393,7 @@ def test_an_impossible_time_in_a_torn_chunk_is_not_believed(put, left):
 
 
 @pytest.mark.parametrize(("minutes", "is_believed"), [(59, True), (61, False)])
-def test_a_torn_chunk_is_believed_for_an_hour(put, left, minutes, is_believed):
+def test_times_in_a_torn_chunk_are_bounded(put, left, minutes, is_believed):
     last = chunks(left)[-1]
     before_ns = struct.unpack_from("<Q", left, chunks(left)[-2].body + 8)[0]
     data = bytearray(left[: last.end - 5])
@@ -402,7 +402,7 @@ def test_a_torn_chunk_is_believed_for_an_hour(put, left, minutes, is_believed):
     assert dropped == pytest.approx(minutes * 60.0 * is_believed, abs=0.01)
 
 
-def test_a_bad_cadence_does_not_keep_a_trial_from_being_saved(tmp_path):
+def test_a_bad_cadence_does_not_prevent_recovery(tmp_path):
     slow = make_cycles(100)
     slow["host_ns"] = START_NS + np.arange(100) * 3_000_000
     writer = write_trial(tmp_path / "T01.mcap", slow)
@@ -415,7 +415,7 @@ def test_a_bad_cadence_does_not_keep_a_trial_from_being_saved(tmp_path):
 # --- files ----------------------------------------------------------------------------
 
 
-def test_the_source_stays_and_the_copy_is_read_only(put, left):
+def test_the_source_is_kept_and_the_copy_is_read_only(put, left):
     path = put(left)
     recovery = recover_file(path)
     assert path.read_bytes() == left
@@ -427,7 +427,7 @@ def test_the_source_stays_and_the_copy_is_read_only(put, left):
     ]
 
 
-def test_a_whole_file_is_said_to_be_whole(put, sealed):
+def test_a_complete_file_is_reported_complete(put, sealed):
     path = put(sealed)
     recovery = recover_file(path)
     assert (recovery.path, recovery.is_new) == (path, False)
@@ -442,7 +442,7 @@ def looks(path):
     return path.read_bytes(), now.st_ino, now.st_size, now.st_mode, changed
 
 
-def test_a_second_recovery_finds_the_first(put, left):
+def test_a_second_recovery_reuses_the_first(put, left):
     path = put(left)
     first = recover_file(path)
     written = looks(first.path)
@@ -477,14 +477,14 @@ def test_a_full_disk_leaves_no_half_file(put, left, monkeypatch):
 @pytest.mark.parametrize(
     "data", [b"", b"\x89MCAP0\r\n", b"not a trial at all", bytes(99)]
 )
-def test_a_file_with_nothing_in_it_is_refused(put, data):
+def test_an_empty_file_is_refused(put, data):
     path = put(data)
     with pytest.raises(TrialFileError, match="nothing to save"):
         recover_file(path)
     assert [p.name for p in path.parent.iterdir()] == [path.name]
 
 
-def test_a_name_that_is_no_text_is_taken_all_the_same(put, left):
+def test_a_file_name_that_is_not_text_is_accepted(put, left):
     recovery = recover_file(put(left, os.fsdecode(b"T\xff07.mcap.partial")))
     assert recovery.verified.cycles == 300
 
@@ -498,7 +498,7 @@ def test_a_name_that_is_no_text_is_taken_all_the_same(put, left):
         ("odd", "odd.recovered.mcap"),
     ],
 )
-def test_the_new_name_follows_from_the_old(tmp_path, source, target):
+def test_the_recovered_name_derives_from_the_source(tmp_path, source, target):
     assert recovered_path(tmp_path / source) == tmp_path / target
 
 
@@ -537,7 +537,7 @@ MAGIC_BYTES = b"\x89MCAP0\r\n"
         (message_record(7), "messages without a channel"),
     ],
 )
-def test_a_record_that_refers_to_nothing_is_left_out(tmp_path, records, reason):
+def test_a_record_with_a_dangling_reference_is_omitted(tmp_path, records, reason):
     sound = channel_record(1, 0) + message_record(1)
     data = MAGIC_BYTES + sound + records + message_record(1)
     salvage = SoundRecords(data, tmp_path / "T01.mcap")
@@ -557,7 +557,7 @@ def kinds_of(data, path):
     return [type(one).__name__ for one in SoundRecords(data, path)]
 
 
-def test_behind_damage_a_chunk_without_a_checksum_proves_nothing(tmp_path):
+def test_after_damage_a_chunk_without_a_checksum_is_not_trusted(tmp_path):
     content = channel_record(1, 0) + message_record(1)
     path, damage = tmp_path / "T01.mcap", b"\xff" * 30
     proved = chunk_record(content, zlib.crc32(content))
@@ -568,7 +568,7 @@ def test_behind_damage_a_chunk_without_a_checksum_proves_nothing(tmp_path):
 
 
 @pytest.mark.parametrize("size", [1, 2, 9])
-def test_bytes_too_many_before_a_chunk_cost_themselves_alone(tmp_path, size):
+def test_surplus_bytes_before_a_chunk_cost_no_data(tmp_path, size):
     content = channel_record(1, 0) + message_record(1)
     chunk = chunk_record(content, zlib.crc32(content))
     data = MAGIC_BYTES + b"\xff" * size + chunk
@@ -580,7 +580,7 @@ def test_bytes_too_many_before_a_chunk_cost_themselves_alone(tmp_path, size):
 
 
 @pytest.mark.parametrize("is_torn", [False, True])
-def test_channels_are_known_from_behind_an_end_of_the_data(tmp_path, is_torn):
+def test_channels_are_read_from_beyond_a_premature_data_end(tmp_path, is_torn):
     """Also from behind one that is all that is left of a head."""
     content, end = message_record(77), record(15, bytes(4))
     chunk = chunk_record(content, zlib.crc32(content))
@@ -589,7 +589,7 @@ def test_channels_are_known_from_behind_an_end_of_the_data(tmp_path, is_torn):
     assert [kind for kind in kinds if kind != "Gap"][:2] == ["Channel", "Message"]
 
 
-def test_a_record_of_a_kind_that_there_is_not_ends_no_gap(put, left):
+def test_a_record_of_an_unknown_kind_does_not_end_a_gap(put, left):
     third, fourth = chunks(left)[2:4]
     unknown = record(16, bytes(20))
     data = flipped(left, third.end - 9)
@@ -599,7 +599,7 @@ def test_a_record_of_a_kind_that_there_is_not_ends_no_gap(put, left):
     assert gaps == [(third.start, fourth.start + len(unknown))]
 
 
-def test_a_definition_that_an_attachment_quotes_defines_nothing(tmp_path):
+def test_a_definition_quoted_in_an_attachment_is_ignored(tmp_path):
     quoted = channel_record(77, 0) * 2
     fields = struct.pack("<QQI", 0, 0, 1) + b"a" + struct.pack("<IQ", 0, len(quoted))
     body = fields + quoted
@@ -621,7 +621,7 @@ def test_a_channel_without_a_schema_has_none_in_the_copy(put, left):
     assert schemas["/cycle"] > 0
 
 
-def test_nothing_of_a_chunk_is_given_that_breaks_in_its_middle(tmp_path):
+def test_a_chunk_damaged_in_the_middle_yields_no_messages(tmp_path):
     content = chunk_content(compression="") + message_record(99)
     data = with_chunk(content, len(content), compression="")
     found, salvage = salvaged_messages(data, tmp_path / "T01.mcap")
@@ -632,19 +632,19 @@ def test_nothing_of_a_chunk_is_given_that_breaks_in_its_middle(tmp_path):
     assert len(salvaged_messages(data, tmp_path / "T01.mcap")[0]) == 1
 
 
-def test_what_begins_otherwise_is_no_mcap_file(tmp_path):
+def test_a_file_without_the_magic_is_not_an_mcap_file(tmp_path):
     data = b"x" * len(MAGIC_BYTES) + channel_record(1, 0) + message_record(1)
     salvage = SoundRecords(data, tmp_path / "T01.mcap")
     assert list(salvage) == []
     assert "no MCAP file" in salvage.reason
 
 
-def test_a_file_that_is_whole_lost_no_second(put, sealed):
+def test_a_complete_file_has_no_loss(put, sealed):
     recovery = recover_file(put(sealed, "T09.mcap"))
     assert (recovery.seconds_dropped, recovery.bytes_dropped) == (0.0, 0)
 
 
-def test_a_chunk_that_ends_in_a_record_is_not_sound(tmp_path):
+def test_a_chunk_that_ends_within_a_record_is_damaged(tmp_path):
     content = chunk_content(compression="") + b"\x05\x10"
     data = with_chunk(content, len(content), compression="")
     found, salvage = salvaged_messages(data, tmp_path / "T01.mcap")
@@ -662,7 +662,7 @@ def test_a_chunk_that_ends_in_a_record_is_not_sound(tmp_path):
         (b"\x01\x00", False),
     ],
 )
-def test_an_index_of_messages_is_whole_or_said_to_be_broken(tmp_path, index, is_sound):
+def test_a_message_index_is_complete_or_reported_damaged(tmp_path, index, is_sound):
     before = channel_record(1, 0) + message_record(1)
     data = MAGIC_BYTES + before + record(MESSAGE_INDEX, index) + message_record(1)
     salvage = SoundRecords(data, tmp_path / "T01.mcap")
@@ -672,13 +672,13 @@ def test_an_index_of_messages_is_whole_or_said_to_be_broken(tmp_path, index, is_
 
 
 @pytest.mark.parametrize("topics", [TRIAL_TOPICS, FLIGHT_TOPICS, TRUTH_TOPICS])
-def test_topics_are_known_by_the_sizes_of_their_messages(topics):
+def test_topics_are_recognised_by_their_message_sizes(topics):
     own = {"/cycle": CYCLE.size, "/truth": TRUTH.size}
     sizes = {i: own.get(topic, 77) for i, topic in enumerate(topics, 1)}
     assert topics_by_sizes(sizes) == topics
 
 
-def test_messages_of_another_version_are_not_taken_for_those_of_today():
+def test_messages_of_another_version_are_not_misread():
     number = list(TRIAL_TOPICS).index("/cycle") + 1
     assert topics_by_sizes({number: CYCLE.size - 4}) == {}
     assert topics_by_sizes({number: CYCLE.size, 40: 8}) == {}

@@ -60,14 +60,14 @@ def reader(trial):
     return TrialReader(trial)
 
 
-def test_cycles_come_back_bit_for_bit(reader, cycles):
+def test_cycles_round_trip_bit_for_bit(reader, cycles):
     data = reader.cycles().data
     names = [name for name in data.dtype.names if name not in {"sec", "nanosec"}]
     for name in names:
         assert data[name].tobytes() == cycles[name].tobytes(), name
 
 
-def test_cycles_are_bit_identical_to_what_rosbags_reads(trial, reader):
+def test_cycles_are_bit_identical_when_read_by_rosbags(trial, reader):
     rows = reader.cycles()
     theirs = messages_of(trial)["/cycle"]
     assert rows.data.tobytes() == b"".join(data for _, data in theirs)
@@ -91,7 +91,7 @@ def test_times_follow_one_offset(reader, cycles):
     assert np.array_equal(stamps, rows.log_time.astype(np.int64))
 
 
-def test_the_rate_is_500_hz_where_nothing_is_missed(reader):
+def test_the_rate_is_nominal_if_no_cycle_is_missed(reader):
     rows = reader.cycles()
     steps = np.diff(rows.data["cycle"].astype(np.int64))
     assert set(np.diff(rows.log_time.astype(np.int64)) / steps) == {PERIOD_NS}
@@ -140,7 +140,7 @@ def test_the_rate_of_the_views_is_a_setting(tmp_path, every, views):
     assert TrialReader(tmp_path / "T.mcap").topic_counts()["/wrench"] == views
 
 
-def test_facts_come_before_messages_and_the_result_after(trial):
+def test_descriptions_precede_messages_and_the_result_follows(trial):
     data = trial.read_bytes()
     order = [span.opcode for span in spans(data)]
     first = min(i for i, opcode in enumerate(order) if opcode in MESSAGE_OPCODES)
@@ -158,7 +158,7 @@ def test_attachments_come_back_with_their_digests(reader):
         assert reader.metadata["provenance"][f"sha256:{name}"] == digest
 
 
-def test_metadata_says_what_was_recorded(reader):
+def test_metadata_describe_the_recording(reader):
     assert reader.metadata["trial"]["format_version"] == "1.0"
     assert reader.metadata["trial"]["session"] == "S"
     assert reader.metadata["clock"] == {
@@ -243,7 +243,7 @@ def test_publishing_never_replaces_a_file(tmp_path):
     assert verify_file(writer.partial, writer.counts).cycles == 10
 
 
-def test_a_folder_that_is_not_there_is_said(tmp_path):
+def test_a_missing_folder_is_reported(tmp_path):
     with pytest.raises(TrialFileError, match="No such file"):
         TrialWriter(tmp_path / "nowhere" / "T.mcap", make_header())
 
@@ -332,7 +332,7 @@ def test_verify_refuses_a_wrong_cadence(tmp_path):
         verify_file(sealed_anyway(tmp_path, cycles).partial)
 
 
-def test_verify_accepts_a_cadence_within_two_percent(tmp_path):
+def test_verify_accepts_a_cadence_within_the_tolerance(tmp_path):
     cycles = make_cycles(50)
     cycles["host_ns"] = START_NS + 1_009_000 * 2 * np.arange(50)  # 0.9 % slow
     assert verify_file(sealed_anyway(tmp_path, cycles).partial).cycles == 50
@@ -362,7 +362,7 @@ def test_verify_refuses_an_empty_trial(tmp_path):
         verify_file(sealed_anyway(tmp_path, make_cycles(0)).partial)
 
 
-def test_verify_refuses_other_messages_than_were_written(tmp_path):
+def test_verify_refuses_changed_messages(tmp_path):
     writer = sealed_anyway(tmp_path, make_cycles(20))
     writer.counts.messages["/events"] = 1
     with pytest.raises(TrialFileError, match="other messages"):
@@ -370,7 +370,7 @@ def test_verify_refuses_other_messages_than_were_written(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["trial", "clock", "provenance", "channels", "result"])
-def test_verify_wants_every_metadata_record(tmp_path, monkeypatch, name):
+def test_verify_requires_every_metadata_record(tmp_path, monkeypatch, name):
     add = Writer.add_metadata
 
     def forgetful(self, record, data):
@@ -383,7 +383,7 @@ def test_verify_wants_every_metadata_record(tmp_path, monkeypatch, name):
         verify_file(writer.partial)
 
 
-def test_verify_wants_every_attachment_as_it_was(tmp_path, monkeypatch):
+def test_verify_requires_every_attachment_unchanged(tmp_path, monkeypatch):
     add = Writer.add_attachment
 
     def careless(self, created, logged, name, media_type, data):
@@ -407,9 +407,7 @@ def test_verify_wants_every_attachment_as_it_was(tmp_path, monkeypatch):
         ("clock", "utc_offset_ns", "0"),
     ],
 )
-def test_verify_says_so_when_metadata_make_no_sense(
-    tmp_path, monkeypatch, name, key, value
-):
+def test_verify_reports_invalid_metadata(tmp_path, monkeypatch, name, key, value):
     add = Writer.add_metadata
 
     def lying(self, record, data):
@@ -424,7 +422,7 @@ def test_verify_says_so_when_metadata_make_no_sense(
         verify_file(writer.partial)
 
 
-def test_a_full_disk_keeps_the_partial_and_says_how_to_recover(tmp_path, monkeypatch):
+def test_a_full_disk_keeps_the_partial_file_with_a_recovery_hint(tmp_path, monkeypatch):
     writer = write_trial(tmp_path / "T.mcap", make_cycles(200))
     kept = writer.partial.stat().st_size
 
@@ -444,7 +442,7 @@ _FSYNCS = 6  # of a trial that is flushed once, finished and published
 
 
 @pytest.mark.parametrize("number", [None, *range(_FSYNCS)])
-def test_no_fsync_of_a_trial_fails_in_silence(tmp_path, monkeypatch, number):
+def test_no_fsync_failure_is_silent(tmp_path, monkeypatch, number):
     usual, calls = os.fsync, []
 
     def fsync(descriptor):
@@ -468,7 +466,7 @@ def test_no_fsync_of_a_trial_fails_in_silence(tmp_path, monkeypatch, number):
         assert len(calls) == number + 1
 
 
-def test_a_strange_note_does_not_end_the_recording(tmp_path):
+def test_an_unusual_note_does_not_end_the_recording(tmp_path):
     writer = write_trial(tmp_path / "T.mcap", make_cycles(10))
     writer.write_event(START_NS, 20, "operator", "broken \udc80 key")
     assert seal(writer, "end").cycles == 10

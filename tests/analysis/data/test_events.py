@@ -55,7 +55,7 @@ def test_bounce_back_has_its_lowest_speed_and_its_spike():
     assert slip.spike == pytest.approx(4.0, abs=0.05)
 
 
-def test_slow_backward_motion_is_no_bounce():
+def test_slow_backward_motion_is_not_a_bounce():
     (slip,) = find_slips(record(bounce=-0.0099))
     assert not slip.has_bounce
     assert slip.spike is None

@@ -14,7 +14,7 @@ def walk():
 
 
 @pytest.mark.parametrize(("low", "high"), [(10.0, 80.0), (3.0, 40.0)])
-def test_a_band_is_what_the_filter_passes_both_ways(walk, low, high):
+def test_a_band_is_the_zero_phase_passband(walk, low, high):
     from scipy.signal import butter, sosfiltfilt
 
     wanted = sosfiltfilt(butter(2, (low, high), "band", fs=RATE, output="sos"), walk)
@@ -23,7 +23,7 @@ def test_a_band_is_what_the_filter_passes_both_ways(walk, low, high):
     assert passed[:, inner] == pytest.approx(wanted[:, inner], abs=1e-4 * wanted.std())
 
 
-def test_a_band_keeps_a_tone_inside_and_takes_one_outside():
+def test_a_band_passes_a_tone_inside_and_removes_one_outside():
     t = np.arange(4000) / RATE
     inside, outside = (np.sin(2 * np.pi * f * t) for f in (28.0, 0.5))
     passed = band_pass(np.stack([inside, outside + 7.0]), 10.0, 80.0, RATE, 2)
@@ -34,7 +34,7 @@ def test_a_band_keeps_a_tone_inside_and_takes_one_outside():
 
 @pytest.mark.parametrize("deriv", [0, 1, 2])
 @pytest.mark.parametrize("order", [2, 3])
-def test_a_local_polynomial_is_that_of_savitzky_and_golay(walk, deriv, order):
+def test_a_local_polynomial_agrees_with_savitzky_golay(walk, deriv, order):
     from scipy.signal import savgol_filter
 
     wanted = savgol_filter(walk.T, 15, order, deriv=deriv, delta=0.002, axis=0)

@@ -25,14 +25,14 @@ def axes(t, wrench):
 
 @pytest.mark.parametrize("resolution", [0.0, 0.02, 0.1, 0.5])
 @pytest.mark.parametrize("noise", [0.02, 0.3])
-def test_a_sound_sensor_freezes_in_no_channel(resolution, noise):
+def test_a_sound_sensor_has_no_frozen_channel(resolution, noise):
     for seed in range(20):
         assert axes(*sliding(resolution=resolution, noise=noise, seed=seed)) == []
 
 
 @pytest.mark.parametrize("axis", range(6))
 @pytest.mark.parametrize(("begin", "end"), [(0.0, 6.0), (2.0, 6.0), (2.0, 2.4)])
-def test_a_frozen_channel_is_told_with_value_and_time(axis, begin, end):
+def test_a_frozen_channel_is_reported_with_value_and_time(axis, begin, end):
     t, wrench = sliding()
     still = (t >= begin) & (t < end)
     wrench[still, axis] = -3.25
@@ -44,31 +44,31 @@ def test_a_frozen_channel_is_told_with_value_and_time(axis, begin, end):
     assert f" stands at -3.25 {unit} for {end - begin:.1f} s" in found.text
 
 
-def test_a_channel_that_is_stuck_at_one_bit_is_told():
+def test_a_channel_stuck_within_one_bit_is_reported():
     t, wrench = sliding()
     wrench[1000:, 2] = 5.0 + 0.02 * (np.arange(len(t) - 1000) % 3 == 0)
     assert axes(t, wrench) == [2]
 
 
-def test_a_channel_at_its_end_is_told():
+def test_a_saturated_channel_is_reported():
     t, wrench = sliding()
     wrench[:, 1] = np.minimum(wrench[:, 1], wrench[:, 1].min() + 0.1)
     assert axes(t, wrench) == [1]
 
 
-def test_a_channel_that_is_renewed_once_a_second_is_told():
+def test_a_rarely_updated_channel_is_reported():
     t, wrench = sliding()
     wrench[:, 4] = np.repeat(wrench[::500, 4], 500)[: len(t)]
     assert axes(t, wrench) == [4]
 
 
-def test_several_channels_are_told_each_by_itself():
+def test_several_frozen_channels_are_reported_separately():
     t, wrench = sliding()
     wrench[500:, [0, 5]] = wrench[500, [0, 5]]
     assert axes(t, wrench) == [0, 5]
 
 
-def test_a_gap_of_the_record_is_no_frozen_channel():
+def test_a_gap_of_the_record_is_not_a_frozen_channel():
     t, wrench = sliding()
     left = np.ones(len(t), bool)
     left[1000:1400] = False
@@ -76,6 +76,6 @@ def test_a_gap_of_the_record_is_no_frozen_channel():
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 5])
-def test_a_few_samples_say_nothing(count):
+def test_a_few_samples_give_no_report(count):
     t, wrench = sliding()
     assert axes(t[:count], wrench[:count]) == []

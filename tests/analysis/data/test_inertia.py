@@ -43,7 +43,7 @@ def test_its_uncertainty_is_the_spread_of_repeated_measurements():
     assert np.median(stated) == pytest.approx(forces.std(), rel=0.1)
 
 
-def test_lost_rows_are_no_jerk():
+def test_lost_rows_are_not_an_acceleration():
     kept = np.delete(np.arange(T.size), [200, 201, 202, 450, 800])
     whole, holed = (inertial_force(t, swung(t), 0.5).force for t in (T, T[kept]))
     assert holed == pytest.approx(whole[kept], abs=0.02)
@@ -82,7 +82,7 @@ def shaken(tmp_path_factory):
     return load_trial(write(tmp_path_factory.mktemp("shaken") / "T01.mcap", cycles))
 
 
-def test_a_trial_without_inertia_has_the_grounds_force_alone(shaken):
+def test_an_inertia_corrected_trial_has_only_the_ground_force(shaken):
     inner = slice(20, -20)
     kept = np.abs(shaken.force - FORCE)[inner].max()
     removed = np.abs(shaken.without_inertia().force - FORCE)[inner].max()
@@ -90,7 +90,7 @@ def test_a_trial_without_inertia_has_the_grounds_force_alone(shaken):
     assert removed < 0.1 * kept
 
 
-def test_the_choice_says_how_much_it_took_and_how_sure_it_is(shaken):
+def test_the_correction_is_reported_with_its_uncertainty(shaken):
     choice = parse_choice("inertia=removed")
     F_t = choice.series(shaken).F_t
     assert F_t[100] == pytest.approx(shaken.without_inertia().traction[100, 1])
@@ -107,7 +107,7 @@ def test_a_table_has_no_mass(shaken):
 
 
 @pytest.mark.slow
-def test_without_inertia_a_simulated_trial_is_nearer_to_the_truth(tmp_path):
+def test_inertia_correction_brings_a_simulated_trial_nearer_to_the_truth(tmp_path):
     config = write_config(tmp_path)
     data = tmp_path / "data"
     done = run_short(config, data, "S0", 1)

@@ -43,7 +43,7 @@ LATE_MS = (50.0, 75.0, 100.0, 200.0, 333.0, 500.0, 750.0, 1000.0)
 
 
 @pytest.mark.parametrize("late_ms", [-20.0, -3.0, 0.0, 1.3, 5.0, 20.0, 40.0, *LATE_MS])
-def test_an_offset_is_found_to_half_a_millisecond(late_ms):
+def test_an_offset_is_found_accurately(late_ms):
     lag = lag_of(jamming(late_ms * 1e-3))
     assert lag is not None
     assert lag.seconds * 1e3 == pytest.approx(late_ms, abs=0.5)
@@ -58,7 +58,7 @@ def test_an_offset_is_found_at_other_rates(rate):
 
 
 @pytest.mark.parametrize("every", [7, 10, 100])
-def test_lost_rows_are_no_offset(every):
+def test_lost_rows_are_not_an_offset(every):
     series = jamming(0.004)
     left = np.arange(series.t.size) % every != 0
     lag = force_lag(series.t[left], series.v_t[left], series.F_t[left])
@@ -67,25 +67,23 @@ def test_lost_rows_are_no_offset(every):
 
 
 @pytest.mark.parametrize("terrain", ["S0", "B10"])
-def test_trials_of_another_program_come_within_three_milliseconds(
-    slice_trials, terrain
-):
+def test_the_offset_of_another_programs_trials_is_small(slice_trials, terrain):
     known = [lag for s in slice_trials.get(terrain, []) if (lag := lag_of(s))]
     assert all(abs(lag.seconds) < 3e-3 for lag in known)
 
 
-def test_a_smooth_slip_says_nothing(slice_trials):
+def test_a_smooth_slip_gives_no_lag(slice_trials):
     assert [lag_of(series) for series in slice_trials["TF"]] == [None] * len(
         slice_trials["TF"]
     )
 
 
-def test_a_force_that_has_nothing_to_do_with_the_motion_says_nothing():
+def test_a_force_unrelated_to_motion_gives_no_lag():
     series = jamming()
     assert force_lag(series.t, series.v_t, jamming(seed=9).F_t) is None
 
 
-def test_a_motion_that_explains_half_of_the_slow_force_says_nothing():
+def test_a_partly_explained_force_gives_no_lag():
     """On a plate the ground's own force varies below 40 Hz, and the noise is above."""
     from scipy.signal import butter, sosfilt
 
@@ -114,11 +112,11 @@ def test_a_motion_that_explains_half_of_the_slow_force_says_nothing():
         lambda s: replace(s, t=s.t * 1e-9),
     ],
 )
-def test_absurd_trials_say_nothing(change):
+def test_absurd_trials_give_no_lag(change):
     assert lag_of(change(jamming())) is None
 
 
-def test_a_trial_of_a_few_rows_says_nothing():
+def test_a_very_short_trial_gives_no_lag():
     series = jamming(seconds=0.3)
     assert lag_of(series) is None
 
@@ -127,24 +125,24 @@ def named(series):
     return {d.name: d for d in doubts_of(prepare_trial(series, PrepareOptions()))}
 
 
-def test_a_late_force_is_doubted_with_its_offset():
+def test_a_late_force_is_reported_with_its_offset():
     doubt = named(jamming(0.020))["lag"]
     assert "20 ms late" in doubt.seen
     assert "--what-if lag=20" in doubt.remedy
 
 
 @pytest.mark.parametrize("late_ms", LATE_MS)
-def test_a_force_is_doubted_however_late_it_is(late_ms):
+def test_a_force_is_doubted_at_any_searched_lag(late_ms):
     assert f"{late_ms:.0f} ms late" in named(jamming(late_ms * 1e-3))["lag"].seen
 
 
 @pytest.mark.parametrize("late_ms", [1100.0, 3000.0])
-def test_a_force_later_than_is_looked_says_nothing(late_ms):
+def test_a_lag_beyond_the_searched_range_is_not_found(late_ms):
     assert lag_of(jamming(late_ms * 1e-3)) is None
 
 
 @pytest.mark.parametrize("late_ms", [0.0, 100.0, 500.0])
-def test_a_short_trial_is_searched_as_far_as_it_reaches(late_ms):
+def test_a_short_trial_is_searched_within_its_length(late_ms):
     found = lag_of(jamming(late_ms * 1e-3, seconds=2.3))
     assert found is not None
     assert found.seconds * 1e3 == pytest.approx(late_ms, abs=1.0)
@@ -152,7 +150,7 @@ def test_a_short_trial_is_searched_as_far_as_it_reaches(late_ms):
 
 
 @pytest.mark.parametrize("late_ms", [0.0, 300.0])
-def test_a_motion_that_repeats_itself_says_nothing(late_ms):
+def test_a_periodic_motion_gives_no_lag(late_ms):
     """Of a foot that is shaken evenly, one period late looks like in time."""
     t = np.arange(4000) / 500.0
     phase = 2.0 * np.pi * 15.0 * t
@@ -171,12 +169,12 @@ def test_an_early_force_is_doubted_too():
     assert "early" in named(jamming(-0.015))["lag"].seen
 
 
-def test_a_force_as_old_as_its_time_stamps_say_is_not_doubted():
+def test_a_force_consistent_with_its_time_stamps_is_not_doubted():
     assert "lag" not in named(replace(jamming(0.006), stamped_lag=0.006))
     assert "lag" in named(replace(jamming(0.0), stamped_lag=0.006))
 
 
-def test_three_milliseconds_are_no_reason_for_doubt():
+def test_a_small_lag_is_not_doubted():
     assert "lag" not in named(jamming(0.002))
 
 
@@ -194,15 +192,15 @@ def after_a_rest(series, F_n, F_t, seconds=1.0):
     )
 
 
-def test_a_foot_that_rests_on_its_traction_is_a_swapped_column():
+def test_resting_on_the_traction_column_indicates_swapped_columns():
     assert "swapped" in named(after_a_rest(jamming(), F_n=0.3, F_t=3.0))
 
 
-def test_a_foot_that_rests_on_its_weight_is_not_doubted():
+def test_resting_on_the_normal_force_is_not_doubted():
     assert "swapped" not in named(after_a_rest(jamming(), F_n=3.0, F_t=1.4))
 
 
-def test_a_step_that_the_median_misses_a_little_is_no_reason_for_silence():
+def test_a_small_median_error_of_the_step_still_gives_a_lag():
     series = jamming(0.004)
     t = series.t - 2e-5 * (np.arange(series.t.size) % 3 == 1)
     lag = force_lag(t, series.v_t, series.F_t)
@@ -210,13 +208,13 @@ def test_a_step_that_the_median_misses_a_little_is_no_reason_for_silence():
     assert lag.seconds == pytest.approx(0.004, abs=5e-4)
 
 
-def test_forces_taken_later_undo_the_offset():
+def test_shifting_forces_undoes_the_offset():
     lag = lag_of(jamming(0.020).with_lag_removed(0.020))
     assert lag is not None
     assert abs(lag.seconds) < 0.5e-3
 
 
-def test_forces_taken_later_keep_velocity_and_its_time():
+def test_shifting_forces_keeps_velocity_and_time():
     series = jamming()
     later = series.with_lag_removed(0.1)
     count = later.t.size
@@ -225,12 +223,12 @@ def test_forces_taken_later_keep_velocity_and_its_time():
     np.testing.assert_allclose(later.F_t, series.F_t[50 : 50 + count])
 
 
-def test_forces_taken_later_are_as_much_younger_by_their_stamps():
+def test_shifting_forces_reduces_their_age():
     stamped = replace(jamming(0.006), stamped_lag=0.006)
     assert stamped.with_lag_removed(0.006).stamped_lag == pytest.approx(0.0)
 
 
-def test_forces_of_kept_samples_are_not_taken_across_their_gaps():
+def test_forces_are_not_shifted_across_gaps():
     with pytest.raises(SettingsError, match="kept samples"):
         replace(jamming(), is_prepared=True).with_lag_removed(0.02)
 

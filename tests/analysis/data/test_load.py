@@ -83,12 +83,12 @@ def trial(tmp_path_factory):
 @pytest.mark.parametrize(
     ("fields", "stones"), [({"stone_size": "none"}, "none"), ({}, "")]
 )
-def test_the_stones_are_those_of_the_recording(tmp_path, fields, stones):
+def test_stones_are_read_from_the_recording(tmp_path, fields, stones):
     trial = load_trial(write(tmp_path / "T01.mcap", fields=fields))
     assert trial.series().stones == trial.series("sole").stones == stones
 
 
-def test_the_sole_is_where_the_joints_put_it(trial):
+def test_the_sole_follows_the_joint_kinematics(trial):
     for k in (0, 50, 99):
         wanted = MODEL.sole_pose(trial.cycles["position"][k])[0]
         assert trial.sole[k] == pytest.approx(wanted, abs=1e-12)
@@ -118,12 +118,12 @@ def test_the_displacement_is_counted_from_the_far_end(trial):
     assert trial.displacement == pytest.approx(wanted)
 
 
-def test_a_trial_knows_its_name_terrain_and_kind(trial):
+def test_a_trial_has_its_name_terrain_and_kind(trial):
     assert (trial.name, trial.terrain, trial.is_simulated) == ("S001/T01", "S10", True)
     assert trial.frame == FRAME
 
 
-def test_the_series_has_the_columns_in_their_places(trial):
+def test_the_series_has_its_columns_in_order(trial):
     series = trial.series()
     assert (series.terrain, series.name) == ("S10", "S001/T01")
     assert series.v_t.tolist() == trial.traction[:, 0].tolist()
@@ -132,7 +132,7 @@ def test_the_series_has_the_columns_in_their_places(trial):
     assert series.t == pytest.approx(np.arange(100) * 0.002)
 
 
-def test_the_calibration_in_the_file_decides(trial, tmp_path):
+def test_the_calibration_in_the_file_is_used(trial, tmp_path):
     """So a better one can be applied later."""
     untared = payload_to_toml(PAYLOAD, TOOL.sole)
     other = load_trial(write(tmp_path / "T.mcap", **{"ft_calibration.toml": untared}))
@@ -147,7 +147,7 @@ def test_a_gap_has_no_velocity(tmp_path):
     assert loaded.series().dropped_rows == 2
 
 
-def test_a_recovered_trial_is_loaded_and_known_to_be_incomplete(trial, tmp_path):
+def test_a_recovered_trial_is_loaded_as_incomplete(trial, tmp_path):
     write(tmp_path / "T.mcap", finish=False)
     loaded = load_trial(recover_file(tmp_path / "T.mcap.partial").path)
     told = [t.metadata["result"].get("complete") for t in (trial, loaded)]
@@ -178,7 +178,7 @@ def test_a_file_without_an_attachment_is_refused(tmp_path, name):
         ("terrain.toml", ATTACHMENTS["terrain.toml"].replace('"S10"', '""')),
     ],
 )
-def test_an_attachment_that_makes_no_sense_is_refused(tmp_path, name, text):
+def test_an_invalid_attachment_is_refused(tmp_path, name, text):
     assert text != ATTACHMENTS[name]
     path = write(tmp_path / "T.mcap", **{name: text})
     with pytest.raises(TrialFileError):
@@ -202,7 +202,7 @@ def changed(field, row, value):
         (changed("wrench_raw", slice(None), np.nan), "0 finite rows"),
     ],
 )
-def test_records_that_no_arm_can_have_made_are_refused(tmp_path, cycles, reason):
+def test_impossible_records_are_refused(tmp_path, cycles, reason):
     with pytest.raises(TrialFileError, match=reason):
         load_trial(write(tmp_path / "T.mcap", cycles))
 
@@ -212,7 +212,7 @@ def test_a_few_unknown_forces_are_dropped_and_counted(tmp_path):
     assert load_trial(write(tmp_path / "T.mcap", cycles)).series().dropped_rows == 5
 
 
-def test_a_file_that_was_never_ended_is_refused(tmp_path):
+def test_an_unfinished_file_is_refused(tmp_path):
     write(tmp_path / "T.mcap", finish=False)
     with pytest.raises(TrialFileError, match="cut off"):
         load_trial(tmp_path / "T.mcap.partial")
@@ -221,19 +221,19 @@ def test_a_file_that_was_never_ended_is_refused(tmp_path):
 @pytest.mark.parametrize(
     "content", [b"", b"\x89MCAP0\r\n", struct.pack("<100I", *[7] * 100)]
 )
-def test_what_is_no_trial_is_refused(tmp_path, content):
+def test_a_file_that_is_not_a_trial_is_refused(tmp_path, content):
     path = tmp_path / "T.mcap"
     path.write_bytes(content)
     with pytest.raises(TrialFileError):
         load_trial(path)
 
 
-def test_a_file_that_is_not_there_is_refused(tmp_path):
+def test_a_missing_trial_file_is_refused(tmp_path):
     with pytest.raises(TrialFileError, match=r"T\.mcap"):
         load_trial(tmp_path / "T.mcap")
 
 
-def test_a_truth_file_is_no_trial(tmp_path):
+def test_a_truth_file_is_not_a_trial(tmp_path):
     path = write(tmp_path / "T.mcap")
     path.write_bytes(path.read_bytes().replace(b"/cycle", b"/truth"))
     with pytest.raises(TrialFileError):
@@ -282,7 +282,7 @@ def summarised(trials):
     return with_tares([health_of(trial) for trial in trials], trials)
 
 
-def test_health_tells_age_temperature_and_saturation(trial):
+def test_health_reports_age_temperature_and_saturation(trial):
     host, flags = trial.cycles["host_ns"], np.zeros(trial.t.size, np.uint32)
     flags[:25] = int(Flag.FT_SATURATED)
     columns = {"arm_ns": host + 500_000, "ft_ns": host - 1_000_000, "flags": flags}
@@ -296,7 +296,7 @@ def test_health_tells_age_temperature_and_saturation(trial):
     assert health.tare == pytest.approx(tuple(trial.payload.bias[:3]))
 
 
-def test_the_load_is_held_against_what_was_set(trial):
+def test_the_load_is_compared_with_its_setting(trial):
     (health,) = summarised([as_left(trial)])
     set_load = 0.3 * 9.81 * np.cos(FRAME.incline)
     assert health.load_bias == pytest.approx(
@@ -304,7 +304,7 @@ def test_the_load_is_held_against_what_was_set(trial):
     )
 
 
-def test_drag_is_the_power_that_friction_takes(trial):
+def test_drag_is_the_power_lost_to_friction(trial):
     one = np.zeros((trial.t.size, 7))
     one[:, 1] = 0.1
     (health,) = summarised([as_left(trial, velocity=one)])
@@ -324,7 +324,7 @@ def test_a_tare_is_bracketed_by_the_next_of_its_session(trial):
     assert first.force_uncertainty > 0.1
 
 
-def test_without_a_second_tare_the_floor_is_that_of_the_noise(trial):
+def test_without_a_second_tare_the_floor_is_the_noise(trial):
     (alone,) = summarised([as_left(trial)])
     assert alone.force_uncertainty is None
     assert alone.floor == pytest.approx(np.sqrt(2 / np.pi) * alone.noise)

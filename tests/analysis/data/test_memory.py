@@ -18,25 +18,25 @@ def computer(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_it_is_a_part_of_what_is_free_and_no_less_than_the_least(computer):
+def test_the_budget_is_a_share_of_free_memory_above_a_minimum(computer):
     assert share_of_memory(8, 10) == 1_024_000
     assert share_of_memory(8, 2_000_000) == 2_000_000
 
 
 @pytest.mark.parametrize(("most", "part"), [("3000000", 250_000), ("max", 1_024_000)])
-def test_a_group_of_processes_may_have_less(computer, most, part):
+def test_a_control_group_may_lower_the_budget(computer, most, part):
     (computer / "memory.max").write_text(most)
     (computer / "memory.current").write_text("1000000")
     assert share_of_memory(8, 10) == part
 
 
 @pytest.mark.parametrize("text", ["", "MemAvailable:", "MemAvailable: many kB"])
-def test_without_a_statement_it_is_the_least(computer, text):
+def test_without_information_the_budget_is_the_minimum(computer, text):
     (computer / "meminfo").write_text(text)
     assert share_of_memory(8, 10) == 10
 
 
-def test_a_process_may_have_less():
+def test_a_process_limit_may_lower_the_budget():
     """In a process of its own: its limit would stay."""
     program = (
         "import resource\n"

@@ -11,7 +11,7 @@ from analysis.data.load import load_trial
 from analysis.data.plausibility import doubt_summary, doubts_of, doubts_of_record
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import TractionSeries
-from analysis.data.tare_bracket import TareBracket
+from analysis.data.tare_bracket import LARGEST_CHANGE, TareBracket
 
 RECORDED = Path(__file__).parents[2] / "data" / "recorded" / "session-1.0.tar.xz"
 TIME, SPEED, LOAD, ALONG = range(4)
@@ -40,7 +40,7 @@ def times(column, factor):
     return disturb
 
 
-def test_a_push_as_it_should_be_raises_no_doubt():
+def test_a_normal_push_raises_no_doubt():
     assert names(pushed()) == set()
 
 
@@ -74,17 +74,17 @@ def test_a_foot_that_is_carried_through_the_air_is_not_judged():
         *("mm/s", "ms", "mN", "kN", "F_t in mN", "friction of ice"),
     ],
 )
-def test_a_disturbed_table_is_doubted_for_what_was_done_to_it(disturb, expected):
+def test_a_disturbed_table_is_doubted_for_its_disturbance(disturb, expected):
     assert names(disturb(pushed())) == expected
 
 
-def test_a_unit_that_looks_wrong_is_named_with_the_option_that_mends_it():
+def test_a_suspicious_unit_is_reported_with_the_remedy():
     series = TractionSeries("S0", "T01", *times(SPEED, 1e3)(pushed()).T)
     (doubt,) = doubts_of(prepare_trial(series, PrepareOptions()))
     assert doubt.remedy == "--unit v_t=mm/s"
 
 
-def test_doubts_of_one_kind_are_one_line_with_their_trials():
+def test_doubts_of_one_kind_share_one_line():
     series = TractionSeries("S0", "T01", *times(ALONG, 1e3)(pushed()).T)
     doubts = doubts_of(prepare_trial(series, PrepareOptions()))
     (line,) = doubt_summary([("T01", doubts), ("T02", doubts)])
@@ -121,18 +121,18 @@ def test_a_recorded_trial_raises_no_doubt(recorded):
     assert doubts_of(prepared) == []
 
 
-def test_a_sensor_turned_by_90_degrees_shows_more_force_across_than_along(recorded):
+def test_a_sensor_turned_sideways_shows_more_force_across_than_along(recorded):
     assert kinds(turned(recorded, 90)) == {"lateral"}
 
 
-def test_a_sensor_turned_by_180_degrees_shows_a_ground_that_drives_the_foot(recorded):
+def test_a_reversed_sensor_shows_a_ground_that_drives_the_foot(recorded):
     half = turned(recorded, 180)
     prepared = prepare_trial(half.series(), PrepareOptions())
     assert {doubt.name for doubt in doubts_of(prepared)} == {"power", "ratio"}
 
 
 @pytest.mark.parametrize("axis", range(6))
-def test_a_channel_that_stands_still_is_doubted_by_name(recorded, axis):
+def test_a_frozen_channel_is_doubted_by_name(recorded, axis):
     cycles = recorded.cycles.copy()
     cycles["wrench_raw"][500:, axis] = cycles["wrench_raw"][500, axis]
     found = {d.name: d for d in doubts_of_record(replace(recorded, cycles=cycles))}
@@ -140,7 +140,7 @@ def test_a_channel_that_stands_still_is_doubted_by_name(recorded, axis):
     assert found["frozen"].seen.startswith(f"{name} stands at ")
 
 
-def test_a_sample_that_several_cycles_show_is_no_frozen_channel(recorded):
+def test_a_sample_repeated_over_cycles_is_not_a_frozen_channel(recorded):
     """A sensor that is slower than the loop, or lost for a while, is not frozen."""
     cycles = recorded.cycles.copy()
     held = slice(600, 1000)
@@ -149,7 +149,7 @@ def test_a_sample_that_several_cycles_show_is_no_frozen_channel(recorded):
     assert "frozen" not in kinds(replace(recorded, cycles=cycles))
 
 
-def test_a_foot_that_is_not_pressed_by_a_frozen_channel_is_doubted(recorded):
+def test_an_unloaded_foot_with_a_frozen_channel_is_doubted(recorded):
     """Without normal force no other doubt is raised."""
     cycles = recorded.cycles.copy()
     cycles["wrench_raw"][:, 2] = cycles["wrench_raw"][0, 2]
@@ -158,15 +158,15 @@ def test_a_foot_that_is_not_pressed_by_a_frozen_channel_is_doubted(recorded):
     assert kinds(found) == {"frozen"}
 
 
-@pytest.mark.parametrize(("moved", "is_doubted"), [(1.9, False), (2.1, True)])
-def test_a_zero_that_moved_about_a_trial_is_doubted(recorded, moved, is_doubted):
+@pytest.mark.parametrize(("share", "is_doubted"), [(0.99, False), (1.01, True)])
+def test_a_zero_that_moved_around_a_trial_is_doubted(recorded, share, is_doubted):
     biases = np.zeros((2, 6))
-    biases[1, :2] = moved / np.sqrt(2.0)
+    biases[1, :2] = share * LARGEST_CHANGE / np.sqrt(2.0)
     about = replace(recorded, bracket=TareBracket((-2.0, 8.0), biases))
     assert ("zero" in kinds(about)) is is_doubted
 
 
-def test_swapped_axes_of_the_moment_do_not_belong_to_the_force(recorded):
+def test_swapped_moment_axes_contradict_the_force(recorded):
     cycles = recorded.cycles.copy()
     raw = cycles["wrench_raw"]
     raw[:, [3, 4]] = raw[:, [4, 3]]

@@ -5,6 +5,8 @@ from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
 from analysis.data.prepare import (
+    MINIMUM_KEPT,
+    MINIMUM_TRAVEL_SHARE,
     CoverageShares,
     PrepareOptions,
     foot_velocity,
@@ -54,7 +56,7 @@ def test_velocity_is_missing_across_four_missing_samples():
 
 
 @pytest.mark.parametrize(("step", "found"), [(10, [(0, 8)]), (11, [(0, 4), (4, 8)])])
-def test_a_step_of_more_than_ten_usual_ones_is_a_gap_of_the_record(step, found):
+def test_a_much_longer_step_is_a_gap_of_the_record(step, found):
     assert stretches(np.cumsum([0.0, 1, 1, 1, step, 1, 1, 1])) == found
 
 
@@ -82,22 +84,31 @@ def test_travel_is_the_integral_of_velocity(make_series):
 
 
 @pytest.mark.parametrize(
-    ("samples", "container", "is_countable"),
-    [(1250, None, True), (1245, None, False), (2000, 0.44, True), (2000, 0.45, False)],
+    ("kept", "share", "is_countable"),
+    [
+        *((MINIMUM_KEPT, None, True), (MINIMUM_KEPT - 1, None, False)),
+        *((2 * MINIMUM_KEPT, 1.01, True), (2 * MINIMUM_KEPT, 0.99, False)),
+    ],
 )
-def test_a_trial_counts_with_250_samples_and_nine_tenths_of_the_container(
-    make_series, samples, container, is_countable
+def test_a_trial_needs_enough_samples_and_travel(
+    make_series, kept, share, is_countable
 ):
-    options = PrepareOptions(container_travel=container)
+    """`share`: travel relative to the least that the container demands."""
+    options = PrepareOptions()
+    samples = kept * options.downsample
+    least = 0.1 * samples * 0.002  # m at 0.1 m/s and 500 Hz
+    if share is not None:
+        container = least / MINIMUM_TRAVEL_SHARE / share
+        options = PrepareOptions(container_travel=container)
     trial = prepare_trial(make_series(np.full(samples, 0.1)), options)
     assert trial.is_countable is is_countable
 
 
-def test_nine_tenths_of_the_container_to_the_last_bit_are_enough(make_series):
+def test_travel_of_exactly_the_required_share_is_enough(make_series):
     series = make_series(np.full(2000, 0.1))
     way = prepare_trial(series, PrepareOptions()).travel
-    near = way / 0.9
-    container = next(c for c in np.nextafter(near, [near, 0, 1]) if 0.9 * c == way)
+    near, share = way / MINIMUM_TRAVEL_SHARE, MINIMUM_TRAVEL_SHARE
+    container = next(c for c in np.nextafter(near, [near, 0, 1]) if share * c == way)
     for wanted, is_countable in ((container, True), (container * (1 + 1e-9), False)):
         options = PrepareOptions(container_travel=float(wanted))
         assert prepare_trial(series, options).is_countable is is_countable
@@ -114,7 +125,7 @@ def test_nine_tenths_of_the_container_to_the_last_bit_are_enough(make_series):
         {"fastest": float("nan")},
     ],
 )
-def test_options_that_make_no_sense_are_refused(choice):
+def test_invalid_options_are_refused(choice):
     with pytest.raises(SettingsError):
         PrepareOptions(**choice)
 
@@ -139,7 +150,7 @@ def test_kept_samples_agree_with_an_independent_analysis(slice_trials, key, kept
     assert abs(prepare_trial(series, PrepareOptions()).kept - kept) <= 1
 
 
-def test_a_foot_that_never_moves_has_no_share_in_the_window():
+def test_a_foot_that_never_moves_has_no_window_share():
     assert CoverageShares(0.0, 1.0, 0.0, 0.0).window_of_moving is None
     shares = CoverageShares(0.3, 0.4, 0.1, 0.2)
     assert shares.window_of_moving == pytest.approx(0.5)
@@ -162,7 +173,7 @@ def test_smoothing_and_thinning_are_times_and_follow_the_rate(rate, widths):
     assert prepare_trial(series, PrepareOptions()).widths == widths
 
 
-def test_samples_that_were_prepared_are_not_prepared_again(make_series, moving):
+def test_prepared_samples_are_not_prepared_again(make_series, moving):
     once = prepare_trial(make_series(moving), PrepareOptions())
     again = TractionSeries(
         *("S0", "kept", once.smooth.t[once.indices], once.v_t, once.F_n, once.F_t),
@@ -191,7 +202,7 @@ def test_a_time_in_any_unit_takes_no_more_than_the_trial(step, last):
     assert trial.lag is None
 
 
-def test_a_smoothing_wider_than_a_second_is_refused():
+def test_too_wide_a_smoothing_is_refused():
     assert PrepareOptions(smoothing=501).smoothing == 501
     with pytest.raises(SettingsError, match="nothing of a slip"):
         PrepareOptions(smoothing=503)
@@ -220,7 +231,7 @@ def test_uneven_rows_are_averaged_over_seconds():
     assert np.median(kept) == pytest.approx(0.010, rel=0.05)
 
 
-def test_of_uneven_rows_the_first_of_every_hundredth_second_is_kept():
+def test_uneven_rows_are_thinned_by_time():
     rng = np.random.default_rng(2)
     t = 7.0 + np.cumsum(rng.exponential(0.004, 800))
     v_t = np.full(800, 0.1)

@@ -1,7 +1,13 @@
 import numpy as np
 import pytest
 
-from analysis.data.quality import CoverageGrid, coverage, quick_ratio, thinnest
+from analysis.data.quality import (
+    ENOUGH,
+    CoverageGrid,
+    coverage,
+    quick_ratio,
+    thinnest,
+)
 
 
 class Trial:
@@ -25,14 +31,17 @@ def test_speed_counts_in_both_directions():
     assert coverage([Trial([-0.3], [1.0])]).counts[3, 0] == 1
 
 
-def test_the_thinnest_cell_a_person_can_aim_at_is_named():
+def test_the_thinnest_reachable_cell_is_named():
     counts = np.full((4, 4), 100)
     counts[1, 2], counts[2, 1] = 1, 2
     assert thinnest(CoverageGrid(counts)) == "slower than 0.05 m/s, above 5 N"
 
 
-@pytest.mark.parametrize(("held", "is_thin"), [(19, True), (20, False)])
-def test_a_cell_is_thin_below_two_percent_of_the_samples(held, is_thin):
+FEW = round(1000 * ENOUGH)  # of a thousand samples
+
+
+@pytest.mark.parametrize(("held", "is_thin"), [(FEW - 1, True), (FEW, False)])
+def test_a_cell_below_its_share_of_samples_is_thin(held, is_thin):
     counts = np.zeros((4, 4), int)
     for cell in ((1, 1), (2, 1), (2, 2), (0, 1), (0, 2)):
         counts[cell] = 100
@@ -40,17 +49,17 @@ def test_a_cell_is_thin_below_two_percent_of_the_samples(held, is_thin):
     assert (thinnest(CoverageGrid(counts)) != "") is is_thin
 
 
-def test_nothing_is_thin_when_every_aim_is_covered():
+def test_no_cell_is_thin_if_all_reachable_cells_are_covered():
     assert thinnest(CoverageGrid(np.full((4, 4), 100))) == ""
 
 
-def test_cells_nobody_can_aim_at_are_not_thin():
+def test_unreachable_cells_are_not_thin():
     counts = np.full((4, 4), 100)
     counts[3, 3] = counts[0, 0] = 0
     assert thinnest(CoverageGrid(counts)) == ""
 
 
-def test_without_a_trial_nothing_is_thin():
+def test_without_a_trial_no_cell_is_thin():
     assert thinnest(coverage([])) == ""
 
 

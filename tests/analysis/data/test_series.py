@@ -18,14 +18,14 @@ def test_rows_that_are_not_finite_are_dropped_and_counted():
     assert 0.3 not in series.t.round(6)
 
 
-def test_rows_that_are_there_twice_are_dropped_and_counted():
+def test_duplicated_rows_are_dropped_and_counted():
     doubled = [np.repeat(column, 2) for column in columns()]
     series = TractionSeries("S0", "a.csv", *doubled)
     assert series.repeated_rows == 10
     assert series.t.tolist() == columns()[0].tolist()
 
 
-def test_a_value_that_stays_is_no_row_twice():
+def test_a_constant_value_is_not_a_duplicated_row():
     assert TractionSeries("S0", "a.csv", *columns()).repeated_rows == 0
 
 
@@ -35,7 +35,7 @@ def test_arrays_of_a_trial_cannot_be_changed():
         series.F_n[0] = 5.0
 
 
-def test_the_callers_arrays_stay_theirs():
+def test_the_callers_arrays_are_not_modified():
     t, v, F_n, F_t = columns()
     series = TractionSeries("S0", "a.csv", t, v, F_n, F_t)
     v[0] = 99.0
@@ -70,7 +70,7 @@ def test_a_terrain_needs_a_usable_name(name):
         TractionSeries(name, "a.csv", *columns())
 
 
-def test_rate_comes_from_the_median_step():
+def test_the_rate_follows_from_the_median_step():
     t, *rest = columns()
     t[5:] += 3.0
     assert TractionSeries("S0", "a.csv", t, *rest).rate == pytest.approx(10.0)

@@ -50,7 +50,7 @@ def test_file_and_sidecar_give_both_tares(load):
         '{"next_tare": {"t_ns": "x", "bias": [0, 0, 0, 0, 0, 0]}}',
     ],
 )
-def test_a_sidecar_without_a_sound_tare_gives_no_bracket(load, sidecar):
+def test_a_sidecar_without_a_valid_tare_gives_no_bracket(load, sidecar):
     trial = load(sidecar)
     assert trial.bracket is None
     assert trial.interpolated() is trial
@@ -60,14 +60,14 @@ def test_an_older_recording_without_the_time_of_its_tare_is_read(load):
     assert load(json.dumps({"next_tare": NEXT_TARE}), fields={}).bracket is None
 
 
-def test_the_zero_goes_in_a_straight_line_and_stays_at_its_ends():
+def test_the_zero_is_interpolated_linearly_and_held_at_its_ends():
     bracket = TareBracket((-2.0, 8.0), np.stack([STORED, NEXT]))
     drift = bracket.drift(np.array([-5.0, -2.0, 3.0, 8.0, 9.0]))
     shares = np.array([0.0, 0.0, 0.5, 1.0, 1.0])
     assert drift == pytest.approx(shares[:, None] * (NEXT - STORED))
 
 
-def test_an_interpolated_trial_has_the_force_by_the_zero_of_its_moment(load):
+def test_an_interpolated_trial_uses_the_zero_at_each_instant(load):
     trial = load(json.dumps({"next_tare": NEXT_TARE}))
     other = trial.interpolated()
     passed = (2.0 + trial.t) / 10.0

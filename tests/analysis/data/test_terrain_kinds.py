@@ -17,19 +17,19 @@ from analysis.data.terrain_kinds import (
         ("S10", ["", "big"], "big"),
     ],
 )
-def test_the_recorded_stones_decide_and_the_name_does_not(terrain, stones, kind):
+def test_recorded_stones_decide_the_kind_and_not_the_name(terrain, stones, kind):
     assert terrain_kind(terrain, stones) == kind
 
 
 @pytest.mark.parametrize(
     ("terrain", "kind"), [("S10", "small"), ("B0", "big"), ("Tf", "flat")]
 )
-def test_without_stones_the_papers_names_stand_for_theirs(terrain, kind):
+def test_without_stones_the_papers_names_imply_theirs(terrain, kind):
     assert terrain_kind(terrain, [""]) == kind
 
 
 @pytest.mark.parametrize("stones", [[], [""], ["gravel"], ["small", "none"]])
-def test_unknown_or_contradicting_stones_are_a_kind_of_their_own(stones):
+def test_unknown_or_contradicting_stones_are_a_separate_kind(stones):
     assert terrain_kind("Tundra", stones) == "Tundra"
     assert kind_title("Tundra") == surface_of("Tundra") == "Tundra"
 

@@ -15,24 +15,24 @@ def hill(theta, top=TOP):
     return -50.0 - 0.5 * far @ BEND @ far, -BEND @ far
 
 
-def test_the_top_is_reached():
+def test_the_optimum_is_reached():
     found = climb(hill, START, BOX)
     np.testing.assert_allclose(found.theta, TOP, atol=1e-3)
     assert found.value == pytest.approx(-50.0, abs=1e-6)
     assert found.evaluations < 30
 
 
-def test_a_top_outside_the_box_ends_on_its_edge():
+def test_an_optimum_outside_the_box_ends_on_its_edge():
     found = climb(lambda theta: hill(theta, np.add(TOP, [9.0, 0.0, 0.0])), START, BOX)
     assert found.theta[0] == 4.0
 
 
-def test_a_start_outside_the_box_is_taken_into_it():
+def test_a_start_outside_the_box_is_clamped():
     found = climb(hill, START - 9.0, BOX)
     np.testing.assert_allclose(found.theta, TOP, atol=1e-3)
 
 
-def test_places_without_a_value_are_gone_round():
+def test_points_without_a_value_are_avoided():
     def objective(theta):
         if theta[0] > 1.0:
             raise SettingsError("none")
@@ -42,14 +42,14 @@ def test_places_without_a_value_are_gone_round():
     np.testing.assert_allclose(found.theta, TOP, atol=1e-2)
 
 
-def test_a_climb_is_left_where_it_is_told_to():
+def test_a_climb_stops_on_request():
     found = climb(hill, START, BOX, lambda theta, value: value > -60.0)
     assert -60.0 < found.value < -50.01
     assert found.value == pytest.approx(hill(found.theta)[0])
     assert found.evaluations < climb(hill, START, BOX).evaluations
 
 
-def test_a_start_without_a_value_is_below_every_top():
+def test_a_start_without_a_value_ranks_below_every_optimum():
     def objective(theta):
         raise SettingsError("none")
 
@@ -58,14 +58,14 @@ def test_a_start_without_a_value_is_below_every_top():
     assert found.value == -np.inf
 
 
-def test_a_scale_saves_evaluations_and_moves_no_top():
+def test_scaling_saves_evaluations_and_keeps_the_optimum():
     scale = 1.0 / np.sqrt(np.diagonal(BEND))
     found = climb(hill, START, BOX, scale=scale)
     np.testing.assert_allclose(found.theta, TOP, atol=1e-3)
     assert found.evaluations < climb(hill, START, BOX).evaluations
 
 
-def test_theta_is_unscaled_at_the_edge_of_the_box_and_where_a_climb_is_left():
+def test_theta_is_unscaled_at_the_box_edge_and_on_an_early_stop():
     scale, seen = np.array([0.3, 3.0, 0.07]), []
     far = np.add(TOP, [9.0, 0.0, 0.0])
 

@@ -48,7 +48,7 @@ def test_contraction_agrees_with_differences(rows, name):
 
 @pytest.mark.parametrize("name", list(KERNELS))
 @pytest.mark.parametrize("count", [1, 9, 40, 95])  # of rows; strips have 40
-def test_rows_with_themselves_give_the_same_upper_triangle(name, count):
+def test_a_symmetric_kernel_has_the_same_upper_triangle(name, count):
     kernel, rng = KERNELS[name], np.random.default_rng(4)
     X, W = rng.normal(size=(count, 2)), np.triu(rng.normal(size=(count, count)))
     evaluate, whole = kernel.over(X), kernel.over(X, X)
@@ -68,7 +68,7 @@ def test_variances_are_the_diagonal(rows, name):
     np.testing.assert_allclose(kernel.diagonal(theta, X), np.diagonal(K), rtol=1e-12)
 
 
-def test_kernels_compose_with_plus_and_times(rows):
+def test_kernels_compose_by_sum_and_product(rows):
     X, X_other = rows
     a, b = some_theta(SE), some_theta(NN)
     theta = np.concatenate([a, b])
@@ -99,7 +99,7 @@ def test_as_printed_the_variance_is_the_same_everywhere():
 
 
 @pytest.mark.parametrize("noise", [ConstantNoise(), LogLinearNoise(2)])
-def test_noise_contracts_with_its_own_slope(rows, noise):
+def test_noise_gradients_contract(rows, noise):
     X, _ = rows
     theta = np.random.default_rng(4).normal(0, 0.3, len(noise.names))
     d = np.arange(9.0)

@@ -10,7 +10,7 @@ from analysis.gp.trial_noise import TrialNoise, TrialRows
 
 @pytest.mark.parametrize("kernel", [SquaredExponential(), Arcsine()])
 @pytest.mark.parametrize("within", [ConstantNoise(), LogLinearNoise()])
-def test_rows_left_out_are_as_if_they_had_never_been_there(kernel, within):
+def test_leaving_rows_out_equals_fitting_without_them(kernel, within):
     rng = np.random.default_rng(0)
     X, trial = rng.uniform(0.5, 5.0, (60, 2)), np.repeat(np.arange(4), 15)
     y = np.sin(X[:, 0]) + rng.normal(size=4)[trial] + rng.normal(0.0, 0.2, 60)

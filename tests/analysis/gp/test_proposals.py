@@ -52,7 +52,7 @@ def test_every_proposal_has_a_value_for_each_hyperparameter(kernel):
             assert all((move != point).any() for move in kind)
 
 
-def test_the_parts_of_a_sum_begin_with_different_lengths():
+def test_parts_of_a_sum_start_with_different_lengths():
     left, right = np.split(initial_points(SE + SE, 1.0, SD_X)[0], 2)
     assert right[1:] - left[1:] == pytest.approx(np.log(3.0))
     assert right[0] == left[0]
@@ -64,7 +64,7 @@ def test_the_second_factor_of_a_product_has_no_unit():
     assert bounds(SE * SE, 7.0, SD_X)[3] == pytest.approx([-6.0, 4.0])
 
 
-def test_a_kernel_of_ones_own_is_searched_without_a_word_about_it():
+def test_a_custom_kernel_is_searched_without_registration():
     X = np.random.default_rng(1).normal(size=(60, 2))
     y = 3.0 * X[:, 0] + np.random.default_rng(2).normal(0, 0.1, 60)
     optimum = posterior_search(Linear(), ConstantNoise(), X, y)

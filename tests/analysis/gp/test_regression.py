@@ -78,7 +78,7 @@ def test_prediction_has_the_reference_values(vectors, name, case):
 
 
 @pytest.mark.parametrize("name", ["n12", "n60"])
-def test_another_noise_can_be_put_in_place(vectors, name):
+def test_the_noise_model_is_replaceable(vectors, name):
     X, y, _, g = load(vectors, name)
     expected = vectors["sets"][name]["cases"]["se_noise_g"]
     lml, slope = Likelihood(SE, ScaledNoise(g), X, y)(np.array(expected["th"]))
@@ -159,7 +159,7 @@ def test_gradient_of_many_rows_agrees_with_differences(kernel):
 
 
 @pytest.mark.parametrize("kernel", [SE, Arcsine(2), SE + Arcsine(2), SE * SE])
-def test_an_evaluation_leaves_nothing_behind(kernel):
+def test_an_evaluation_keeps_no_memory(kernel):
     X, y = draw(np.random.default_rng(2), 100)
     rng = np.random.default_rng(6)
     here, there = rng.normal(0, 0.3, (2, len(kernel.names) + 1))
@@ -187,7 +187,7 @@ def draw(rng, n):
     return X, f + 0.5 * rng.normal(size=n)
 
 
-def test_known_noise_is_recovered_and_the_band_holds_its_share():
+def test_known_noise_is_recovered_with_nominal_coverage():
     X, y = draw(np.random.default_rng(4), 500)
     model = fit_gp(X[:300], y[:300])
     mean, variance = model.predict(X[300:])
@@ -202,7 +202,7 @@ def test_known_noise_is_recovered_and_the_band_holds_its_share():
     "repeats",
     [20, pytest.param(200, marks=[pytest.mark.long, pytest.mark.timeout(600)])],
 )
-def test_bands_of_a_known_process_hold_their_shares(repeats):
+def test_bands_of_a_known_process_have_nominal_coverage(repeats):
     rng, inside = np.random.default_rng(11), []
     for _ in range(repeats):
         X, y = draw(rng, 110)
@@ -267,7 +267,7 @@ def test_jitter_is_added_only_where_it_is_needed_and_is_recorded():
     assert factorise(K, np.full(30, -1e-11)).jitter == pytest.approx(1e-10)
 
 
-def test_a_hopeless_covariance_is_refused():
+def test_an_ill_conditioned_covariance_is_refused():
     with pytest.raises(SettingsError, match="not positive definite"):
         factorise(-np.eye(5), np.zeros(5))
 
@@ -282,12 +282,12 @@ def test_an_input_that_does_not_vary_is_carried_along():
 @pytest.mark.parametrize(
     ("y", "reason"), [(np.zeros(50), "50 samples"), (np.arange(19.0), "19 samples")]
 )
-def test_outputs_that_teach_nothing_are_refused(y, reason):
+def test_uninformative_outputs_are_refused(y, reason):
     with pytest.raises(SettingsError, match=reason):
         fit_gp(np.random.default_rng(0).normal(size=(y.size, 2)), y)
 
 
-def test_a_process_given_its_own_rows_is_the_same_and_others_change_it(vectors):
+def test_conditioning_on_own_rows_changes_nothing_and_on_others_does(vectors):
     X, y, Xt, _ = load(vectors, "n60")
     fitted = fit_gp(X[:40], y[:40])
     same, more = fitted.given(X[:40], y[:40]), fitted.given(X, y)

@@ -48,14 +48,14 @@ class Hills:
         return self if self.rough is None else self.rough
 
 
-def test_a_search_begins_at_the_likeliest_point_by_a_part_of_the_rows():
+def test_a_search_starts_at_the_best_point_on_a_subset():
     goal = np.log([0.1, 3.5] * ROWS.std(axis=0))
     rough = Hills((np.array([0.0, *goal, 0.0]), 5.0, 1.0))
     optimum = likeliest(Hills((np.zeros(4), 5.0, 1.0), rough=rough))
     np.testing.assert_allclose(optimum.began[0][1:3], goal)
 
 
-def test_a_move_finds_a_top_that_the_first_start_misses():
+def test_a_move_finds_an_optimum_that_the_first_start_misses():
     low = np.array([0.0, -1.0, 0.5, -0.5])
     high = low + np.array([0.0, 0.0, 2.5, 0.0])  # one length apart
     # all that a part of the rows knows of is the lower top
@@ -67,7 +67,7 @@ def test_a_move_finds_a_top_that_the_first_start_misses():
 
 
 @pytest.mark.parametrize("length", [0.5, 5.5])
-def test_a_move_is_far_from_what_is_known(length):
+def test_a_move_is_far_from_known_optima(length):
     search = Search(Hills((np.array([0.0, -1.0, length, -0.5]), 5.0, 3.0)))
     search.climb(search.designed_start())
     search.move()
@@ -80,7 +80,7 @@ def test_a_move_is_far_from_what_is_known(length):
 
 
 @pytest.mark.parametrize("apart", [-0.35, 0.35])
-def test_a_top_beside_the_best_one_is_found(apart):
+def test_a_neighbouring_optimum_is_found(apart):
     low = np.array([0.0, -1.0, 0.5, -0.5])
     high = low + np.array([0.0, apart, 0.0, 0.0])
     both = Hills((low, 5.0, 0.15), (high, 5.1, 0.15))
@@ -89,14 +89,14 @@ def test_a_top_beside_the_best_one_is_found(apart):
     assert found.theta[1] == pytest.approx(high[1], abs=0.05)
 
 
-def test_nothing_is_sought_beside_a_top_along_a_length_without_effect():
+def test_no_neighbour_is_searched_along_an_inactive_length():
     top = np.array([0.0, 5.5, 5.5, -0.5])
     optimum = climb_from(Hills((top, 5.0, 3.0)), [top], is_searched=True)
     gaps = np.abs(np.array(optimum.began[1:])[:, 1:3] - optimum.starts[0].theta[1:3])
     assert gaps.max(axis=1).min() >= 1.0
 
 
-def test_a_climb_is_left_beside_a_known_top():
+def test_a_climb_near_a_known_optimum_is_abandoned():
     top = np.array([0.0, -1.0, 0.5, -0.5])
     hill = Hills((top, 5.0, 2.0))
     alone = [climb_from(hill, [start]) for start in (top + 0.7, top - 0.7)]
@@ -106,7 +106,7 @@ def test_a_climb_is_left_beside_a_known_top():
     assert both.starts[1].evaluations < alone[1].starts[0].evaluations
 
 
-def test_points_without_a_likelihood_are_no_starts():
+def test_points_without_a_likelihood_are_not_starts():
     optimum = likeliest(Hills((np.zeros(4), 5.0, 1.0), hole=lambda x: x[1] < -1))
     assert all(start[1] >= -1 for start in optimum.began)
 
@@ -148,7 +148,7 @@ def test_an_input_that_does_not_vary_is_searched():
     assert np.isfinite(optimum.lml)
 
 
-def test_an_input_with_a_long_length_is_tried_unused():
+def test_an_input_with_a_long_length_is_tried_as_inactive():
     """On a trend the best top may lie where the length is endless."""
     low = np.array([0.0, -1.0, 1.5, -0.5])
     bound = bounds(SE, 1.0, ROWS.std(axis=0))[2, 1]

@@ -27,7 +27,7 @@ def drawn(count, between, within=2.5, tau=0.5, noise=0.3, seconds=12.0, seed=0):
     return trials
 
 
-def test_three_hundred_trials_show_their_spread_by_moments():
+def test_the_spread_of_many_trials_is_estimated_by_moments():
     levels = estimate_levels(TrialResiduals(drawn(300, 0.6)))
     assert levels.is_by_moments
     assert levels.between == pytest.approx(0.6, rel=0.2)
@@ -37,14 +37,14 @@ def test_three_hundred_trials_show_their_spread_by_moments():
     assert levels.components.within == pytest.approx(2.5, rel=0.05)
 
 
-def test_the_spread_of_few_trials_is_by_the_restricted_likelihood():
+def test_the_spread_of_few_trials_is_estimated_by_restricted_likelihood():
     levels = estimate_levels(TrialResiduals(drawn(FEW - 1, 3.0, within=1.0)))
     assert not levels.is_by_moments
     assert levels.between == pytest.approx(3.0, rel=0.4)
     assert levels.levels.size == FEW - 1
 
 
-def test_a_residual_with_memory_is_not_taken_for_a_spread_between_trials():
+def test_correlated_residuals_are_not_mistaken_for_trial_spread():
     found = [
         estimate_levels(
             TrialResiduals(drawn(40, 0.0, within=2.0, tau=0.5, seed=s))

@@ -102,7 +102,7 @@ def test_the_search_recovers_the_spread_between_trials():
     assert np.exp(theta["log_sn"]) == pytest.approx(0.3, rel=0.15)
 
 
-def test_a_new_trial_is_as_uncertain_as_trials_differ():
+def test_uncertainty_of_a_new_trial_includes_the_trial_spread():
     X, _, trials = drawn(10, 20, seed=4)
     rng = np.random.default_rng(5)
     y = rng.normal(0, 2.0, 10)[trials.trial] + rng.normal(0, 0.1, 200)
@@ -113,7 +113,7 @@ def test_a_new_trial_is_as_uncertain_as_trials_differ():
     assert with_level.min() > pooled.mean() * 0.8
 
 
-def test_trials_that_are_not_named_share_nothing():
+def test_unnamed_trials_share_no_effect():
     X, y, _ = drawn(5, 8)
     theta = np.array([0.1, 0.2, 0.3, -0.4])
     alone = Likelihood(SE, ConstantNoise(), X, y).value(theta)
@@ -121,7 +121,7 @@ def test_trials_that_are_not_named_share_nothing():
     assert Likelihood(SE, LEVEL, X, y).value(named) == pytest.approx(alone)
 
 
-def test_other_outputs_are_fitted_from_where_the_first_ended():
+def test_other_outputs_are_fitted_from_the_first_optimum():
     X, _, trials = drawn(8, 20, seed=6)
     rng = np.random.default_rng(7)
     y = 5.0 + np.sin(X[:, 0]) + rng.normal(0, 0.4, 160)
@@ -132,7 +132,7 @@ def test_other_outputs_are_fitted_from_where_the_first_ended():
     assert near.lml == pytest.approx(anew.lml, abs=1e-2)
 
 
-def test_rows_left_out_are_predicted_by_the_others():
+def test_held_out_rows_are_predicted_by_the_others():
     X, _, trials = drawn(6, 12, seed=8)
     y = np.random.default_rng(9).normal(0, 1.0, 6)[trials.trial] + X[:, 0]
     model = fit_gp(X, y, SE, LEVEL, trials=trials)

@@ -47,7 +47,7 @@ def worst_F_n(found, rubbing):
     return float(np.abs(trial.traction[:, 2] - F_n)[sound].max())
 
 
-def test_velocities_that_are_no_numbers_leave_their_positions_usable(imported):
+def test_nan_velocities_leave_positions_usable(imported):
     """It was "0 usable messages of 6000"."""
 
     def change(_, message):
@@ -61,7 +61,7 @@ def test_velocities_that_are_no_numbers_leave_their_positions_usable(imported):
 
 
 @pytest.mark.parametrize("rows", [(3100,), (3100, 3101, 4000)])
-def test_joint_states_of_zeros_are_named_and_left_out(imported, rows):
+def test_joint_states_of_zeros_are_reported_and_omitted(imported, rows):
     """One of 6000 was "a wall. Check the tare"."""
 
     def change(count, message):
@@ -78,7 +78,7 @@ def test_joint_states_of_zeros_are_named_and_left_out(imported, rows):
     assert worst_F_n(found, rubbing) < 0.3
 
 
-def test_joints_that_rest_at_zero_are_joints(imported):
+def test_joints_resting_at_zero_are_accepted(imported):
     rubbing = Rubbing()
     real = rubbing.joints
 
@@ -101,7 +101,7 @@ def test_a_jump_of_a_joint_is_refused_with_its_time(imported):
         imported(rubbing)
 
 
-def test_a_reading_that_never_changes_is_left_out_and_named(imported):
+def test_a_constant_channel_is_omitted_and_reported(imported):
     """2.5 s of it moved F_t by 1.7 N without a word."""
     held = []
 
@@ -120,7 +120,7 @@ def test_a_reading_that_never_changes_is_left_out_and_named(imported):
     assert np.isnan(trial.traction[(at > 5.05) & (at < 7.4), 1]).all()
 
 
-def test_readings_that_are_no_numbers_are_counted(imported):
+def test_nan_readings_are_counted(imported):
     def change(count, message):
         if count % 7 == 3:
             message.wrench.force.x = np.nan
@@ -133,7 +133,7 @@ def test_readings_that_are_no_numbers_are_counted(imported):
     assert worst_F_n(found, rubbing) < 0.3
 
 
-def test_where_nothing_is_usable_the_cause_is_counted(imported):
+def test_without_usable_messages_the_causes_are_counted(imported):
     def change(_, message):
         message.position[:] = np.nan
 
@@ -149,7 +149,7 @@ def test_where_nothing_is_usable_the_cause_is_counted(imported):
 
 
 @pytest.mark.parametrize("clock", [None, "receipt"])
-def test_a_recording_that_is_there_twice_is_named_as_that(imported, tmp_path, clock):
+def test_a_duplicated_recording_is_reported(imported, tmp_path, clock):
     """It was "times do not increase. Record it again"."""
     imported(Rubbing())
     (file,) = (tmp_path / "log").glob("*.mcap")
@@ -206,7 +206,7 @@ def test_a_hot_journal_is_refused_by_its_name(tmp_path):
     assert counted(path) == (2400, [])
 
 
-def test_a_damaged_write_ahead_log_loses_no_more_than_its_own(tmp_path):
+def test_a_damaged_write_ahead_log_loses_only_its_own_messages(tmp_path):
     path = database(tmp_path)
     path.with_name(f"{path.name}-wal").write_bytes(b"\x37\x7f\x06\x82" + bytes(5000))
     assert counted(path) == (2400, [])

@@ -29,7 +29,7 @@ def fastest(found):
 
 
 @pytest.mark.parametrize("rate", [0.5, 0.8, 2.0])
-def test_stamps_of_another_pace_are_refused_until_a_clock_is_stated(imported, rate):
+def test_stamps_at_another_rate_are_refused_until_a_clock_is_stated(imported, rate):
     """v_t of 0.060 m/s was 0.030, 0.048 and 0.120 without a word."""
     rubbing = Rubbing(stamp_rate=rate)
     with pytest.raises(SettingsError, match=rf"run at {rate:g} times") as error:
@@ -39,7 +39,7 @@ def test_stamps_of_another_pace_are_refused_until_a_clock_is_stated(imported, ra
 
 
 @pytest.mark.slow
-def test_the_clock_that_is_stated_is_taken_and_the_doubt_is_named(imported):
+def test_a_stated_clock_is_used_and_the_doubt_reported(imported):
     rubbing = Rubbing(stamp_rate=0.8)
     spans = [(3.0 * 0.8, 11.0 * 0.8)]
     found = imported(rubbing, clock="stamp", trials=spans, tare=(0.1, 0.45))
@@ -59,7 +59,7 @@ def test_a_sensor_clock_that_runs_fast_is_named_with_its_drift(imported):
     assert np.sqrt(np.mean(rest[:, 2] ** 2)) < 0.15
 
 
-def test_clocks_that_are_apart_are_refused_with_both_ways_out(imported):
+def test_offset_clocks_are_refused_with_both_remedies(imported):
     rubbing = Rubbing(clock_offset=0.3)
     with pytest.raises(SettingsError, match="stamped 309 ms later") as error:
         imported(rubbing)
@@ -72,7 +72,7 @@ def test_clocks_that_are_apart_are_refused_with_both_ways_out(imported):
 
 
 @pytest.mark.parametrize("step", [0.05, -0.5])
-def test_a_clock_that_is_set_meanwhile_is_refused_as_that(imported, step):
+def test_a_clock_set_during_the_log_is_refused(imported, step):
     def change(rows):
         for _, received, message in rows:
             stamp = message.header.stamp
@@ -90,12 +90,12 @@ def test_a_clock_that_is_set_meanwhile_is_refused_as_that(imported, step):
         imported(rubbing, clock="receipt")
 
 
-def test_hours_between_two_clocks_are_named(imported):
+def test_a_large_clock_offset_is_reported(imported):
     with pytest.raises(SettingsError, match=r"stamped -18000\.0 s later"):
         imported(Rubbing(clock_offset=-18_000.0))
 
 
-def test_without_stamps_the_clock_has_to_be_stated(imported):
+def test_without_stamps_the_clock_must_be_stated(imported):
     rubbing = Rubbing(stamps=False)
     with pytest.raises(SettingsError, match="stamps of /joint_states are not set"):
         imported(rubbing)
@@ -104,14 +104,14 @@ def test_without_stamps_the_clock_has_to_be_stated(imported):
     assert any("times of receipt, without its stamps" in w for w in found.warnings)
 
 
-def test_topics_that_share_no_time_are_refused_with_both_spans(imported):
+def test_topics_without_common_time_are_refused_with_both_spans(imported):
     rubbing = Rubbing(clock_offset=-18_000.0)
     with pytest.raises(SettingsError, match=r"in time: the joints go from 0 to"):
         imported(rubbing, clock="stamp")
 
 
 @pytest.mark.parametrize("clock", [None, "receipt"])
-def test_a_few_messages_without_a_stamp_are_left_out(imported, clock):
+def test_a_few_messages_without_a_stamp_are_omitted(imported, clock):
     """A simulation begins at 0 s."""
 
     def change(rows):

@@ -57,7 +57,7 @@ def is_right(trial, rubbing):
 
 
 @pytest.mark.slow
-def test_velocity_and_forces_are_those_of_the_truth(imported):
+def test_velocity_and_forces_agree_with_the_truth(imported):
     rubbing = Rubbing(strokes=2, turn=1.0, tilt=0.3, slope=0.1, heading=0.7, lost=0.003)
     found = imported(rubbing)
     assert [trial.name for trial in found.trials] == ["T01", "T02"]
@@ -68,7 +68,7 @@ def test_velocity_and_forces_are_those_of_the_truth(imported):
     assert found.warnings == []
 
 
-def test_checks_show_what_was_stated_rightly(imported):
+def test_checks_confirm_correct_statements(imported):
     rubbing = Rubbing(turn=1.0, slope=0.1, heading=0.7)
     found = imported(rubbing)
     assert check(found, "tare").shown[0] < 0.02  # N that the free foot reads
@@ -111,7 +111,7 @@ def test_a_check_that_disagrees_is_named_and_not_applied(imported, options, word
         ({"tare": "none"}, r"the free foot reads 14\.2 N"),
     ],
 )
-def test_forces_of_no_ground_are_refused_with_the_check_that_disagrees(
+def test_implausible_ground_forces_are_refused_with_the_failed_check(
     imported, options, words
 ):
     with pytest.raises(SettingsError, match=words):
@@ -133,7 +133,7 @@ def test_a_lag_of_a_smooth_push_is_not_claimed(imported):
 
 
 @pytest.mark.slow
-def test_many_starts_that_explain_nothing_are_counted_as_they_are(imported):
+def test_unexplained_onsets_are_counted(imported):
     """They used to be "too few starts and stops"."""
     rubbing = Rubbing(strokes=3)
     rubbing.truth = lambda t: (
@@ -155,7 +155,7 @@ def test_the_other_sign_is_refused_with_the_remedy(imported):
 
 
 @pytest.mark.slow
-def test_a_sensor_that_reads_the_reaction_is_read_with_the_other_word(imported):
+def test_a_reaction_force_sensor_is_read_with_the_matching_option(imported):
     rubbing = Rubbing(sign=-1.0)
     assert is_right(imported(rubbing, acts="foot-on-ground").trials[0], rubbing)
 
@@ -170,7 +170,7 @@ def test_exchanged_axes_are_named(imported, axes, said):
     assert any(said in text for text in found.warnings)
 
 
-def test_a_forgotten_weight_is_named_with_what_it_costs(imported):
+def test_a_missing_weight_is_reported_with_its_effect(imported):
     found = imported(Rubbing(tilt=0.3), mass=0.0)
     assert any("every 0.1 kg of mass" in text for text in found.warnings)
 
@@ -182,7 +182,7 @@ def test_a_tare_may_be_six_numbers(imported):
     assert is_right(found.trials[0], rubbing)
 
 
-def test_slow_joints_are_refused_unless_means_are_wanted(imported):
+def test_slow_joint_states_are_refused_unless_means_are_requested(imported):
     rubbing = Rubbing(joint_rate=40.0)
     with pytest.raises(SettingsError, match=r"has 40\.0 Hz, slips need"):
         imported(rubbing)
@@ -210,7 +210,7 @@ def test_another_frame_in_the_header_is_named(imported):
         ({"foot": "fut"}, "nearest links are foot"),
     ],
 )
-def test_what_cannot_be_is_refused_with_a_way_out(imported, options, why):
+def test_impossible_options_are_refused_with_a_remedy(imported, options, why):
     with pytest.raises(SettingsError, match=why) as error:
         imported(Rubbing(), **options)
     assert error.value.hint or "nearest" in str(error.value)

@@ -60,7 +60,7 @@ def test_every_message_of_every_format_is_read(logs, name):
 
 @pytest.mark.parametrize("name", ["bag", "bag-lz4", "mcap"])
 @pytest.mark.parametrize("share", [0.2, 0.4, 0.6])
-def test_a_cut_log_is_read_to_where_it_was_cut(logs, tmp_path, name, share):
+def test_a_truncated_log_is_read_to_its_end(logs, tmp_path, name, share):
     path = logs[name]
     file = next(path.glob("*.mcap")) if path.is_dir() else path
     cut = tmp_path / file.name
@@ -72,7 +72,7 @@ def test_a_cut_log_is_read_to_where_it_was_cut(logs, tmp_path, name, share):
     assert len(found) < 2400
 
 
-def test_a_topic_of_another_encoding_is_told_and_not_read(tmp_path):
+def test_a_topic_of_another_encoding_is_reported_and_not_read(tmp_path):
     path = tmp_path / "a.mcap"
     with path.open("wb") as file:
         writer = Writer(file)
@@ -88,7 +88,7 @@ def test_a_topic_of_another_encoding_is_told_and_not_read(tmp_path):
 
 
 @pytest.mark.parametrize("spoil", [False, True])
-def test_metadata_that_are_damaged_end_no_log(tmp_path, spoil):
+def test_damaged_metadata_do_not_end_a_log(tmp_path, spoil):
     """No message depends on them."""
     path = tmp_path / "a.mcap"
     with path.open("wb") as file:
@@ -107,7 +107,7 @@ def test_metadata_that_are_damaged_end_no_log(tmp_path, spoil):
         assert log.losses == []
 
 
-def test_what_is_no_log_is_refused(tmp_path):
+def test_a_file_that_is_not_a_log_is_refused(tmp_path):
     for name, data, why in (
         ("a.csv", b"t,v_t\n1,2\n", "not a known log format"),
         ("a.parquet", b"PAR1" + bytes(20), "not a known log format"),
@@ -122,7 +122,7 @@ def test_what_is_no_log_is_refused(tmp_path):
         read(tmp_path / "..")
 
 
-def test_a_view_in_the_place_of_a_table_is_not_read(tmp_path):
+def test_a_view_instead_of_a_table_is_not_read(tmp_path):
     path = tmp_path / "a.db3"
     database = sqlite3.connect(path)
     database.execute("CREATE TABLE topics(id, name, type, serialization_format)")

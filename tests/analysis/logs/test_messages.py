@@ -19,9 +19,7 @@ SHORT = Rubbing(joint_rate=20.0, wrench_rate=20.0, with_velocity=True)
     ("release", "serialization"),
     [(Stores.ROS1_NOETIC, "ros1"), (Stores.ROS2_HUMBLE, "cdr")],
 )
-def test_messages_of_another_library_are_read_as_they_were_written(
-    release, serialization
-):
+def test_messages_of_another_library_round_trip(release, serialization):
     store = get_typestore(release)
     write = store.serialize_ros1 if serialization == "ros1" else store.serialize_cdr
     for topic, _, message in messages(SHORT, store, types_of(store))[:50]:

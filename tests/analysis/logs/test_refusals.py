@@ -123,7 +123,7 @@ ESTABLISHED_BY = {
 }
 
 
-def test_every_sentence_of_refusal_has_its_observation():
+def test_every_refusal_states_its_observation():
     listed = {(m, said) for m, rows in ESTABLISHED_BY.items() for said in rows}
     assert {*sentences()} == listed
     assert all(seen for rows in ESTABLISHED_BY.values() for seen in rows.values())

@@ -22,7 +22,7 @@ def chain(*joints, links="abc"):
     return f'<robot name="r">{text}</robot>'.encode()
 
 
-def test_the_arm_by_its_urdf_is_where_its_own_model_says():
+def test_urdf_kinematics_agree_with_the_arm_model():
     constants = load_constants()
     model = ArmModel(constants)
     leg = RobotLeg(
@@ -83,7 +83,7 @@ def test_a_hostile_urdf_is_refused(data, why):
         ("revolute", '<axis xyz="0 0 0"/>', "j has no axis"),
     ],
 )
-def test_a_joint_that_cannot_be_used_is_refused_where_it_is_on_the_way(kind, more, why):
+def test_an_unsupported_joint_is_refused_if_it_is_in_the_chain(kind, more, why):
     data = chain(("j", kind, "a", "b", more), ("k", "revolute", "a", "c", ""))
     urdf_ = parse_urdf(NOWHERE, data)
     assert RobotLeg(urdf_, "c", "c").joints == ["k"]
@@ -126,7 +126,7 @@ SHAPES = {
 
 
 @pytest.mark.parametrize("name", SHAPES)
-def test_urdfs_as_they_are_met_have_a_foot(name):
+def test_common_urdfs_have_a_foot(name):
     """A URDF of one joint was a traceback, a comment a xacro."""
     leg = RobotLeg(parse_urdf(NOWHERE, SHAPES[name]), "b", "b")
     assert leg.joints == ["j"]
@@ -134,7 +134,7 @@ def test_urdfs_as_they_are_met_have_a_foot(name):
     assert path.foot.shape == path.velocity.shape == (2, 3)
 
 
-def test_a_continuous_joint_turns_as_often_as_it_likes():
+def test_a_continuous_joint_turns_without_limit():
     data = chain(
         ("j", "continuous", "a", "b", '<axis xyz="0 0 1"/>'),
         ("k", "fixed", "b", "c", '<origin xyz="1 0 0"/>'),

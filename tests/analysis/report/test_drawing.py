@@ -39,7 +39,7 @@ def drawings(monkeypatch):
     return drawn
 
 
-def test_the_same_numbers_are_drawn_once_and_come_back_byte_by_byte(store, drawings):
+def test_equal_data_are_drawn_once_and_restored_byte_for_byte(store, drawings):
     shown = (1.0, 2.0)
     assert cached_figures(shown, store) == cached_figures(shown, store) == [FIGURE]
     assert len(drawings) == 1
@@ -50,14 +50,14 @@ def test_without_a_store_figures_are_drawn_every_time(drawings):
     assert len(drawings) == 2
 
 
-def test_other_numbers_are_drawn_anew(store, drawings):
+def test_changed_data_are_drawn_again(store, drawings):
     cached_figures((1.0, 2.0), store)
     cached_figures((1.0, 2.5), store)
     assert drawings == [(1.0, 2.0), (1.0, 2.5)]
 
 
 @pytest.mark.parametrize("kept", [b"", b"{}"], ids=len)
-def test_damaged_figures_are_drawn_anew(tmp_path, store, drawings, kept):
+def test_damaged_figures_are_drawn_again(tmp_path, store, drawings, kept):
     cached_figures(1.0, store)
     (path,) = tmp_path.iterdir()
     path.write_bytes(kept)
@@ -65,7 +65,7 @@ def test_damaged_figures_are_drawn_anew(tmp_path, store, drawings, kept):
     assert len(drawings) == 2
 
 
-def test_what_is_no_figure_is_drawn_anew(store, drawings):
+def test_an_invalid_stored_figure_is_drawn_again(store, drawings):
     store.put(drawing.report_figures, 1.0, ["figure"])
     assert cached_figures(1.0, store) == [FIGURE]
     assert len(drawings) == 1

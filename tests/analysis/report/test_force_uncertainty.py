@@ -61,19 +61,19 @@ KINDS = ("sample", "mean", "interpolated_sample", "interpolated_mean")
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_tares_predict_the_error_of_a_zero_that_forgets_in_seconds(kind):
+def test_tares_predict_the_error_of_a_fast_wandering_zero(kind):
     found, predicted = errors(paths(wandering(3.0)))
     assert getattr(predicted, kind) == pytest.approx(found[kind], rel=0.12)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_zero_that_wanders_steadily_is_never_understated(kind):
+def test_a_slowly_wandering_zero_is_never_underestimated(kind):
     found, predicted = errors(paths(steady))
     assert found[kind] < getattr(predicted, kind)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_steady_wander_is_overstated_at_most_twice(kind):
+def test_a_steady_wander_is_overestimated_at_most_twofold(kind):
     found, predicted = errors(paths(steady))
     assert getattr(predicted, kind) < 2.0 * found[kind]
 
@@ -92,13 +92,13 @@ def trial(bias, change=None, session="S001"):
     )
 
 
-def test_the_change_to_the_next_tare_counts_though_a_trial_between_was_rejected():
+def test_the_next_tare_counts_even_across_a_rejected_trial():
     changes = tare_changes([trial(0.1, change=0.3), trial(0.9)])
     assert changes[0] == pytest.approx(np.full(3, 0.3))
     assert changes[1] is None
 
 
-def test_a_session_without_brackets_goes_by_the_tares_of_its_next_trials():
+def test_without_brackets_the_tares_of_the_next_trials_are_used():
     trials = [trial(0.1), trial(0.4), trial(5.0, session="S002")]
     assert tare_changes(trials)[0] == pytest.approx(np.full(3, 0.3))
     (name,) = uncertainties_of(trials)
@@ -106,7 +106,7 @@ def test_a_session_without_brackets_goes_by_the_tares_of_its_next_trials():
     assert uncertainties_of(trials)[name].change == pytest.approx(0.3)
 
 
-def test_the_floor_has_the_change_of_the_tares_and_the_noise():
+def test_the_uncertainty_floor_combines_tare_change_and_noise():
     known = ForceUncertainty(10, 0.3)
     assert known.floor(0.0) == pytest.approx(0.3 * np.sqrt(2 / np.pi))
     assert known.floor(0.4) == pytest.approx(0.5 * np.sqrt(2 / np.pi))

@@ -38,7 +38,7 @@ def is_whole(figure):
 
 
 @pytest.mark.parametrize(("count", "figures"), [("three", 18), ("one", 13)])
-def test_nothing_of_a_figure_is_cut(findings, count, figures):
+def test_no_part_of_a_figure_is_cut_off(findings, count, figures):
     with styled():
         drawn = {key: spec.draw(findings[count]) for key, spec in FIGURES.items()}
         shown = {key: figure for key, figure in drawn.items() if figure is not None}
@@ -67,7 +67,7 @@ def test_numbers_that_differ_have_distinct_labels():
     assert distinct_labels([1.0, 1.0]) == ["1", "1"]
 
 
-def test_sections_stand_in_their_order_and_keys_of_figures_are_unique():
+def test_sections_are_ordered_and_figure_keys_are_unique():
     assert [section.heading for section in SECTIONS] == list(ReportSection)
     keys = [figure.key for section in SECTIONS for figure in section.figures]
     assert len(keys) == len(set(keys))

@@ -167,7 +167,7 @@ def test_a_report_is_readable_on_screen_and_paper(small_study, tmp_path):
     assert_readable(written(small_study, tmp_path), tmp_path, least=16)
 
 
-def test_the_summary_needs_no_scrolling_on_a_small_desk(small_study, tmp_path):
+def test_the_summary_fits_a_small_screen(small_study, tmp_path):
     found = probe(written(small_study, tmp_path), tmp_path, 1280, SUMMARY)
     assert found == {"hidden": 0, "columns": 12}
 
@@ -205,7 +205,7 @@ def test_a_table_is_sorted_and_a_drawing_is_read_and_enlarged(tmp_path):
     assert found["again"] == found["whole"]
 
 
-def test_a_page_that_asks_or_complains_is_caught(tmp_path):
+def test_a_page_with_requests_or_errors_is_detected(tmp_path):
     page = tmp_path / "asks.html"
     page.write_text(
         '<body><img src="http://127.0.0.1:9/a.png">'

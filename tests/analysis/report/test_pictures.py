@@ -35,7 +35,7 @@ def test_a_picture_of_256_colours_is_exact():
     np.testing.assert_array_equal(read(png_of_few_colours(opaque(page), 320)), page)
 
 
-def test_white_and_what_is_frequent_stay_exact_among_many_shades():
+def test_white_and_frequent_colours_stay_exact():
     page = shaded()
     page[200:300] = (0, 114, 178)
     found = read(png_of_few_colours(opaque(page), 320))
@@ -52,14 +52,14 @@ def test_shades_beyond_the_palette_are_close():
     assert np.abs(found[square] - page[square]).max() < 32
 
 
-def test_a_palette_holds_256_colours_and_the_resolution_is_stated():
+def test_a_palette_is_full_and_the_resolution_is_stated():
     picture = Image.open(io.BytesIO(png_of_few_colours(opaque(shaded()), 320)))
     assert picture.mode == "P"
     assert len(picture.getcolors()) <= 256
     assert picture.info["dpi"] == pytest.approx((320, 320), abs=0.1)
 
 
-def test_a_picture_without_white_is_as_exact():
+def test_a_picture_without_white_is_also_exact():
     page = np.zeros((50, 60, 3), dtype=np.uint8)
     page[10:20] = (213, 94, 0)
     np.testing.assert_array_equal(read(png_of_few_colours(opaque(page), 320)), page)

@@ -73,7 +73,7 @@ def written(small_study, tmp_path_factory):
     return folder, path, Page(path.read_text())
 
 
-def test_page_needs_nothing_from_outside(written):
+def test_the_page_needs_no_external_resource(written):
     _, path, page = written
     text = path.read_text()
     assert "http:" not in text
@@ -131,7 +131,7 @@ def test_page_shows_the_papers_figures_and_table(written):
     assert "paper, Table I" in page.text
 
 
-def test_page_says_simulated_and_carries_further_tables(written):
+def test_the_page_is_marked_simulated_and_has_further_tables(written):
     _, _, page = written
     assert "SIMULATED" in page.text
     assert "LIVE" not in page.text
@@ -139,7 +139,7 @@ def test_page_says_simulated_and_carries_further_tables(written):
     assert "remark" in page.text
 
 
-def test_every_number_and_figure_lies_beside_the_page(written, small_study):
+def test_every_number_and_figure_is_saved_with_the_page(written, small_study):
     folder, path, _ = written
     assert path == folder / "report" / "index.html"
     fits = json.loads((folder / "fits.json").read_text())
@@ -154,9 +154,7 @@ def test_every_number_and_figure_lies_beside_the_page(written, small_study):
         assert file.read_bytes().startswith(start)
 
 
-def test_a_report_without_pdfs_leaves_none_of_an_earlier_one(
-    small_study, tmp_path, monkeypatch
-):
+def test_a_report_without_pdfs_removes_earlier_ones(small_study, tmp_path, monkeypatch):
     def drawn(key, *_, with_pdf, **__):
         return Picture(key, b"png", b"pdf" if with_pdf else b"")
 
@@ -229,7 +227,7 @@ def test_a_study_without_kept_samples_still_has_a_report(make_series, tmp_path):
     assert "No figure could be drawn" in page.text
 
 
-def test_figures_are_the_same_bytes_every_time_but_for_the_watermark(small_study):
+def test_figures_are_reproducible_except_for_the_watermark(small_study):
     results = compute_results(small_study)
     with styled():
         first, second, unmarked = (
@@ -240,12 +238,12 @@ def test_figures_are_the_same_bytes_every_time_but_for_the_watermark(small_study
     assert first.png != unmarked.png
 
 
-def test_excerpt_holds_slips_where_there_are_some(small_study):
+def test_the_excerpt_contains_slips_if_there_are_any(small_study):
     assert len(busiest_window(small_study.terrains["S0"]).slips) >= 2
     assert len(busiest_window(small_study.terrains["TF"]).slips) == 0
 
 
-def test_excerpt_holds_bounce_backs_where_there_are_some(small_study):
+def test_the_excerpt_contains_bounce_backs_if_there_are_any(small_study):
     for name in ("S0", "B0"):
         result = small_study.terrains[name]
         most = max(sum(s.has_bounce for s in trial) for trial in result.slips)
@@ -254,7 +252,7 @@ def test_excerpt_holds_bounce_backs_where_there_are_some(small_study):
         assert shown >= 1
 
 
-def test_bars_across_terrains_carry_the_error_over_trials(small_study):
+def test_bars_across_terrains_show_the_error_over_trials(small_study):
     errors = small_study.cross_errors(GP_SE)
     foreign = [
         e for f in small_study.terrains["S0"].folds for e in f.models[GP_SE].cross["TF"]
@@ -279,7 +277,7 @@ def test_figure_2_names_the_parameters_of_the_fit_of_all_trials(small_study):
         assert ax.get_ylim()[0] <= 0.0
 
 
-def test_only_cells_that_touch_a_sample_are_not_faded():
+def test_cells_without_samples_are_faded():
     counts = np.zeros((5, 6))
     counts[1, 1] = 3
     near = near_samples(counts)
@@ -299,7 +297,7 @@ def test_a_band_below_zero_is_stated(small_study):
         assert (f"{name} (" in stated) == (low < 0)
 
 
-def test_summary_counts_what_was_kept(small_study):
+def test_the_summary_counts_kept_samples(small_study):
     row = dict(
         zip(summary(small_study).header, summary(small_study).rows[0], strict=True)
     )
@@ -308,7 +306,7 @@ def test_summary_counts_what_was_kept(small_study):
     assert row["slips"] == "15"
 
 
-def test_the_papers_own_row_stands_beside_ours(small_study):
+def test_the_papers_row_is_shown_for_comparison(small_study):
     rows = {(row[0], row[1]): row for row in table_one(small_study).rows}
     assert rows["TF", "paper, Table I"][2:7] == [
         "0.843",
@@ -320,7 +318,7 @@ def test_the_papers_own_row_stands_beside_ours(small_study):
     assert ("B0", "this study") in rows
 
 
-def test_a_median_on_a_bound_of_the_search_is_an_inequality(small_study):
+def test_a_median_on_a_search_bound_is_an_inequality(small_study):
     bounds = small_study.options.fit.bounds
     for row in table_one(small_study).rows:
         if row[1] == "this study" and row[4].endswith(f"{bounds.v_s[0]:g}"):
@@ -328,7 +326,7 @@ def test_a_median_on_a_bound_of_the_search_is_an_inequality(small_study):
     assert any("≤" in cell for row in table_one(small_study).rows for cell in row[2:7])
 
 
-def test_a_model_that_says_nothing_is_called_so(make_series, moving):
+def test_an_uninformative_model_is_labelled_so(make_series, moving):
     rng = np.random.default_rng(0)
     trials = [make_series(moving, terrain="noise", seed=k) for k in range(3)]
     for series in trials:
@@ -337,7 +335,7 @@ def test_a_model_that_says_nothing_is_called_so(make_series, moving):
     assert "no model beats a constant" in verdicts(study)[0]
 
 
-def test_a_model_that_helps_is_called_so(small_study):
+def test_a_useful_model_is_labelled_so(small_study):
     assert "of a constant's" in next(v for v in verdicts(small_study) if v[:2] == "TF")
 
 
@@ -355,7 +353,7 @@ def test_a_folder_that_cannot_be_written_is_refused(small_study, tmp_path):
         write_report(small_study, blocked, context())
 
 
-def test_a_failed_write_leaves_the_old_file_and_no_remains(tmp_path, monkeypatch):
+def test_a_failed_write_keeps_the_old_file_and_no_remains(tmp_path, monkeypatch):
     path = tmp_path / "a.txt"
     write_atomic(path, b"old")
 

@@ -85,7 +85,7 @@ def test_surfaces_are_what_the_model_predicts(results, small_study):
     assert surface.variance[i, j] == pytest.approx(one.sd[0] ** 2)
 
 
-def test_the_way_is_the_integral_of_velocity(small_study):
+def test_travelled_distance_is_the_integral_of_velocity(small_study):
     smooth = small_study.terrains["TF"].trials[0].smooth
     expected = np.trapezoid(smooth.v_t, smooth.t)
     assert travel_of(smooth)[-1] == pytest.approx(expected)
@@ -97,7 +97,7 @@ def test_shares_of_a_row_without_windows_are_unknown():
     assert np.isnan(shares[1]).all()
 
 
-def test_chosen_noise_is_counted_and_compared(make_series, moving):
+def test_selected_noise_is_counted_and_compared(make_series, moving):
     trials = [make_series(moving, seed=k) for k in range(3)]
     fit = FitOptions(gp_points=40, models=(GP_SE, GP_SE_NOISE), draws=0)
     options = StudyOptions(fit=fit, n_jobs=1)
@@ -108,7 +108,7 @@ def test_chosen_noise_is_counted_and_compared(make_series, moving):
     assert summary.paired.difference == pytest.approx(difference)
 
 
-def test_findings_are_valid_json_and_lines_of_the_csv(results, small_study):
+def test_findings_are_valid_json_and_csv_rows(results, small_study):
     plain = json.loads(json.dumps(to_plain(plain_findings(results)), allow_nan=False))
     slope = plain["trends"]["S0"]["F_t"]["slope"]
     text = to_csv(small_study, findings_rows(results))

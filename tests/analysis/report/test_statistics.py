@@ -28,7 +28,7 @@ def cell(table, terrain, column):
     return row[list(table.header).index(column)]
 
 
-def test_a_paired_p_stands_beside_the_one_for_all_comparisons():
+def test_a_paired_p_value_is_shown_with_the_adjusted_one():
     pairs = [PairedComparison(-0.1, 0.01, p, 10) for p in (0.002, 0.04)]
     first, missing, second = paired_cells([pairs[0], None, pairs[1]])
     assert "p 0.002, Holm 0.004" in first
@@ -36,7 +36,7 @@ def test_a_paired_p_stands_beside_the_one_for_all_comparisons():
     assert missing == "–"
 
 
-def test_the_note_names_how_many_comparisons_were_made(small_study):
+def test_the_note_states_the_number_of_comparisons(small_study):
     table = paired_table(small_study, "mae", "N")
     count = sum(text.count("Holm") for row in table.rows for text in row[1:])
     assert count == 3 * 4  # terrains, models beside the first
@@ -77,7 +77,7 @@ def test_white_residuals_are_all_independent():
         ((0.01, 0.02), "0.01 to 0.02"),
     ],
 )
-def test_an_end_on_a_bound_is_an_inequality(ends, text):
+def test_an_interval_end_on_a_bound_is_an_inequality(ends, text):
     assert interval_text(BOUNDS, "v_s", Interval(*ends)) == text
 
 
@@ -95,6 +95,6 @@ def test_a_profile_that_does_not_close_is_shown_open(small_study, profile, is_op
     assert "open" not in cell(table, "S0", "δ_s [1]")
 
 
-def test_no_interval_ends_in_a_plain_number_on_a_bound(small_study):
+def test_no_bound_is_shown_as_a_plain_interval_end(small_study):
     for row in parameters(small_study).rows:
         assert not re.search(r"(?<!≤ )\b0\.001\b", row[3])

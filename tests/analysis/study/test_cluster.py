@@ -85,7 +85,7 @@ def end_at_three(number):
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
-def test_a_task_that_ends_its_workers_is_told_and_not_waited_for():
+def test_a_task_that_kills_its_workers_is_reported_at_once():
     import dask
     from distributed import LocalCluster
 
@@ -126,7 +126,7 @@ def test_a_scheduler_on_this_machine_or_by_tls_is_accepted(address):
 
 @pytest.mark.long
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
-def test_a_scheduler_that_is_not_there_is_named():
+def test_a_missing_scheduler_is_named():
     address = f"tcp://127.0.0.1:{free_port()}"
     with pytest.raises(SettingsError, match=address):
         run_tasks(abs, [1, 2], Workers(scheduler=address))

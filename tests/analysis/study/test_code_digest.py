@@ -48,7 +48,7 @@ def test_a_changed_formula_changes_the_digests_of_fits_and_figures(copy, formula
         "ft_sensor/payload.py",
     ],
 )
-def test_what_only_figures_follow_from_leaves_the_digest_of_fits(copy, module):
+def test_code_used_only_by_figures_does_not_change_the_fit_digest(copy, module):
     before = digests(copy)
     path = copy / module
     path.write_text(path.read_text() + "\n")
@@ -61,7 +61,7 @@ def test_equal_sources_elsewhere_have_equal_digests(copy):
     assert digests(copy) == digests(ROOT)
 
 
-def test_fits_import_nothing_that_their_digest_leaves_out():
+def test_the_fit_digest_covers_every_import_of_fits():
     modules = (
         "analysis.study.break_away_fit, analysis.study.covariates, "
         "analysis.study.crossval, analysis.study.terrain_fit, "
@@ -109,7 +109,7 @@ print(len(made), *(fold.models["tustin"].score.mae for fold in folds))
 
 
 @pytest.mark.slow
-def test_a_corrected_formula_is_fitted_anew(copy, tmp_path):
+def test_a_corrected_formula_is_refitted(copy, tmp_path):
     table = Path(__file__).parents[2] / "data" / "rehearsal_slice.npz"
 
     def fitted():

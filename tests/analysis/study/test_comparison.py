@@ -3,19 +3,19 @@ import pytest
 from analysis.study.metrics import compare, standard_error
 
 
-def test_ten_differences_of_one_sign_are_as_rare_as_two_patterns_in_1024():
+def test_the_sign_flip_test_has_the_exact_p_value():
     found = compare([1.0] * 10, [1.1 + 0.01 * k for k in range(10)])
     assert found.p == pytest.approx(2 / 1024)
     assert found.difference == pytest.approx(0.145)
     assert found.trials == 10
 
 
-def test_equal_models_are_not_told_apart():
+def test_equal_models_are_not_distinguished():
     assert compare([1.0, 2.0], [1.0, 2.0]).p == 1.0
     assert compare([0.0, 0.0], [1.0, -1.0]).p == 1.0
 
 
-def test_many_trials_are_judged_by_random_patterns():
+def test_many_trials_are_compared_by_random_sign_flips():
     found = compare([0.0] * 20, [1.0, -1.0] * 10)
     assert found.p == 1.0
     assert compare([0.0] * 20, [1.0] * 20).p < 1e-3

@@ -59,7 +59,7 @@ def results():
 
 
 @pytest.mark.slow
-def test_a_property_of_the_ground_gains(results):
+def test_a_ground_property_improves_prediction(results):
     moisture = results["moisture"]
     assert moisture.verdict == "gain"
     assert moisture.trials == 6
@@ -68,13 +68,13 @@ def test_a_property_of_the_ground_gains(results):
 
 
 @pytest.mark.slow
-def test_a_column_that_has_nothing_to_do_with_it_gains_nothing(results):
+def test_an_unrelated_column_does_not_improve_prediction(results):
     assert results["idle"].verdict == "no gain"
     assert results["idle"].repeated < 0.1
 
 
 @pytest.mark.slow
-def test_what_the_force_moves_repeats_it_whatever_it_gains(results):
+def test_a_column_caused_by_the_force_is_flagged(results):
     tilt = results["tilt"]
     assert tilt.verdict == "repeats F_t"
     assert tilt.lower > 0.05
@@ -96,7 +96,7 @@ def test_the_report_has_a_row_for_every_column(results):
     ("gain", "lower", "verdict"),
     [(0.2, 0.1, "gain"), (0.2, -0.1, "no gain"), (0.04, 0.03, "no gain")],
 )
-def test_a_gain_is_clear_and_not_tiny(gain, lower, verdict):
+def test_a_gain_must_be_significant_and_not_tiny(gain, lower, verdict):
     assert CovariateResult("X", "c", 9, gain, lower, 0.5, 0.1).verdict == verdict
 
 
@@ -106,7 +106,7 @@ def test_two_trials_are_too_few():
 
 
 @pytest.mark.slow
-def test_a_column_that_never_varies_gains_nothing():
+def test_a_constant_column_does_not_improve_prediction():
     trials = trials_of(3)
     flat = np.full_like(trials[0].smooth.t, 7.0)
     trials = [
@@ -120,7 +120,7 @@ def test_a_column_that_never_varies_gains_nothing():
 
 
 @pytest.mark.slow
-def test_folds_come_back_from_the_store(tmp_path):
+def test_folds_are_restored_from_the_store(tmp_path):
     rows = {"X": [CovariateRows.of(trial, ("idle",), 1.5) for trial in trials_of(3)]}
     options, store = (
         FitOptions(gp_points=60),
@@ -131,7 +131,7 @@ def test_folds_come_back_from_the_store(tmp_path):
     assert covariate_results(rows, ("idle",), options, 1, store) == first
 
 
-def test_the_way_since_a_drop_begins_where_the_fall_is_known():
+def test_travel_since_a_drop_begins_at_the_drop():
     t = 0.01 * np.arange(100.0)
     F_t = np.concatenate([np.linspace(0, 4, 50), np.linspace(3.5, 0, 10), np.zeros(40)])
     F_t[70:] += np.linspace(0, 0.5, 30)  # no drop follows
@@ -144,7 +144,7 @@ def test_the_way_since_a_drop_begins_where_the_fall_is_known():
     assert way[-1] == pytest.approx(0.001 * (99 - known))
 
 
-def test_the_way_is_a_column_of_any_trial():
+def test_travel_is_a_column_of_any_trial():
     rows = CovariateRows.of(trials_of(1)[0], (WAY,), 1.5)
     assert rows.columns.shape == (rows.t.size, 1)
     assert rows.rows.further.shape[1] == 3  # the other columns are inputs of all models
@@ -160,6 +160,6 @@ def test_the_way_is_a_column_of_any_trial():
         ("tilt,skew", ("tilt", "height"), "there is no skew"),
     ],
 )
-def test_what_cannot_be_tested_is_refused(text, known, reason):
+def test_an_untestable_column_is_refused(text, known, reason):
     with pytest.raises(SettingsError, match=reason):
         parse_covariates(text, known)

@@ -47,7 +47,7 @@ def test_a_fold_is_trained_on_every_trial_but_its_own(trials):
     np.testing.assert_array_equal(task.training.F_t, expected)
 
 
-def test_model_of_fold_k_meets_trial_k_of_the_other_terrains(trials):
+def test_the_model_of_a_fold_is_tested_on_the_same_trial_of_other_terrains(trials):
     tasks, _ = plan_folds(trials, FitOptions())
     task = next(t for t in tasks if (t.terrain, t.fold) == ("B0", 2))
     assert set(task.others) == {"S0", "TF"}
@@ -55,13 +55,13 @@ def test_model_of_fold_k_meets_trial_k_of_the_other_terrains(trials):
     np.testing.assert_array_equal(rows.F_t, trials["TF"][2].F_t)
 
 
-def test_up_to_fifty_trials_are_left_out_one_by_one():
+def test_few_trials_are_left_out_one_by_one():
     assert fold_groups([0, 2, 3]) == [(0,), (2,), (3,)]
     assert fold_groups(range(50)) == [(k,) for k in range(50)]
 
 
 @pytest.mark.parametrize("count", [51, 99, 100, 1000])
-def test_beyond_fifty_trials_every_one_is_in_one_of_fifty_groups(count):
+def test_many_trials_are_left_out_in_groups(count):
     groups = fold_groups(range(count))
     assert len(groups) == MOST_FOLDS
     assert sorted(k for group in groups for k in group) == list(range(count))
@@ -106,7 +106,7 @@ def test_a_group_is_left_out_together_and_scored_trial_by_trial(trials):
         ([0], [], []),
     ],
 )
-def test_trials_pair_by_number_and_wrap_where_they_cannot(models, tests, pairs):
+def test_trials_pair_by_number_and_wrap(models, tests, pairs):
     paired = [(k, trial) for k in models for trial in paired_trials(k, models, tests)]
     assert paired == pairs
 
@@ -182,7 +182,7 @@ def test_two_trials_are_enough(trials):
 @pytest.mark.long
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("kernel", [SquaredExponential(2), Arcsine(2)])
-def test_the_search_reaches_the_best_of_twenty_starts(trials, kernel):
+def test_the_search_reaches_the_best_of_many_starts(trials, kernel):
     tasks, _ = plan_folds(trials, FitOptions())
     missed = 0
     for task in tasks:
@@ -238,7 +238,7 @@ def test_folds_share_the_samples_of_the_trials(count):
     assert len({id(table.F_t) for table in tables}) == count
 
 
-def test_a_fold_is_another_one_where_any_of_its_samples_is(trials):
+def test_a_changed_sample_changes_the_fold(trials):
     before, _ = plan_folds(trials, SMALL_FIT)
     keys = [task_key(run_fold, task) for task in before]
     assert len(set(keys)) == len(keys)
@@ -265,7 +265,7 @@ def test_a_fold_is_another_one_where_any_of_its_samples_is(trials):
     assert task_key(run_fold, other[0]) != task_key(run_fold, after[0])
 
 
-def test_folds_of_other_targets_are_other_ones(trials):
+def test_folds_of_different_targets_differ(trials):
     before, _ = plan_folds(trials, SMALL_FIT)
     moved = {
         n: [replace(t, F_t=t.F_t + 1) for t in group] for n, group in trials.items()

@@ -30,7 +30,7 @@ def test_quantiles_invert_the_distribution_function(kind):
         assert law.cdf(np.array([force]))[0] == pytest.approx(share, rel=1e-9)
 
 
-def test_shares_of_0_and_1_are_far_and_finite():
+def test_extreme_quantiles_are_finite():
     never, low, always = predicted().quantiles((0.0, 0.001, 1.0))[:, 0]
     assert np.isfinite([never, always]).all()
     assert never < low < always
@@ -71,13 +71,13 @@ def test_a_level_is_added_to_skewed_residuals():
     assert law.quantiles(SHARES)[:, 0] == pytest.approx(expected, abs=0.05)
 
 
-def test_a_variance_known_from_few_trials_is_expected_to_be_larger():
+def test_a_variance_from_few_trials_is_inflated():
     assert expected_variance(2.0, 10) == pytest.approx(2.0 * 9 / 7)
     assert expected_variance(2.0, 2) == expected_variance(2.0, 5) == 4.0
     assert expected_variance(2.0, 10_000) == pytest.approx(2.0, rel=1e-3)
 
 
-def test_residuals_are_weighed_by_trials():
+def test_residuals_are_weighted_by_trial():
     rng = np.random.default_rng(2)
     short, long = rng.normal(-5.0, 0.1, 100), rng.normal(5.0, 0.1, 10_000)
     found = residual_quantiles([short, long])

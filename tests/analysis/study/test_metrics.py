@@ -40,7 +40,7 @@ def test_densities_and_ranked_scores_have_the_reference_values(vectors):
     )
 
 
-def test_student_t_has_scipys_density_and_the_integral_as_its_score():
+def test_student_t_agrees_with_scipy_and_with_its_integrated_score():
     from scipy import stats
 
     y, given = np.array([1.4]), Prediction(np.array([0.2]), np.array([0.7]), 4.0)
@@ -54,7 +54,7 @@ def test_student_t_has_scipys_density_and_the_integral_as_its_score():
     assert coverage(np.array([law.ppf(0.96)]), given, 0.9) == 0.0
 
 
-def test_ranked_score_of_a_sure_prediction_is_its_error():
+def test_the_crps_of_a_certain_prediction_is_its_error():
     sure = Prediction(np.array([1.0]), np.array([0.0]))
     assert ranked_probability(np.array([3.0]), sure)[0] == pytest.approx(2.0)
 

@@ -79,7 +79,7 @@ def test_bands_widen_where_the_noise_grows():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("spread", [normal, skewed])
-def test_bands_hold_for_trials_that_differ(spread):
+def test_bands_have_nominal_coverage_for_differing_trials(spread):
     shares = {0.5: [], 0.9: []}
     for seed in range(3, 9):
         trials = trials_of(spread, 9, between=1.0, seed=seed)
@@ -111,7 +111,7 @@ def test_a_pooled_fit_of_the_same_trials_is_worse():
     "name", [GP_SE_TRIAL, GP_NN_TRIAL, GP_SE_TUSTIN_TRIAL, GP_NN_TUSTIN_TRIAL]
 )
 @pytest.mark.parametrize("spread", [normal, skewed])
-def test_every_process_has_the_effect_of_a_trial(name, spread):
+def test_every_process_has_a_trial_effect(name, spread):
     data = training(trials_of(spread, 6, between=0.8))
     model = ModelFitter(data, FitOptions()).fit(name)
     found = model.predict(np.array([2.0, 6.0]), np.array([0.05, 0.05]))
@@ -123,7 +123,7 @@ def test_every_process_has_the_effect_of_a_trial(name, spread):
     )
 
 
-def test_one_trial_shows_neither_a_spread_of_levels_nor_residuals():
+def test_one_trial_gives_neither_levels_nor_residuals():
     model = NewTrialFit(training(trials_of(skewed, 1), 60), None).fit(SE)
     assert model.level_sd == 0.0
     assert model.residuals == pytest.approx(normal_scores(SHARES))
@@ -140,7 +140,7 @@ def test_every_model_beyond_the_paper_has_a_fitter():
     assert set(NEW_TRIAL) >= {GP_SE_TRIAL, GP_NN_TRIAL, GP_SE_TUSTIN_TRIAL}
 
 
-def test_residuals_and_levels_share_the_squares_of_trials_left_out():
+def test_held_out_squares_are_split_into_residuals_and_levels():
     trials = trials_of(normal, 12, between=1.0, seed=8)
     model = NewTrialFit(training(trials, 240), None).fit(SE)
     means = [trial.F_t.mean() - 0.5 * trial.F_n.mean() for trial in trials]

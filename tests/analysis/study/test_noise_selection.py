@@ -30,7 +30,7 @@ def chosen_for(data):
     return choose_noise(data, constant, changing, seed=0)
 
 
-def test_constant_noise_is_kept_where_it_is_the_truth():
+def test_constant_noise_is_kept_if_it_is_the_truth():
     data = training(lambda rng, F_n: rng.normal(0, 0.5, F_n.size))
     choice = chosen_for(data)
     assert choice.chosen == "constant"
@@ -51,12 +51,12 @@ def test_heavy_tails_are_chosen():
     assert chosen_for(data).chosen == "student"
 
 
-def test_one_training_trial_leaves_nothing_to_choose_by():
+def test_one_training_trial_allows_no_selection():
     data = training(lambda rng, F_n: rng.normal(0, 0.5, F_n.size), trials=1)
     assert chosen_for(data).chosen == "constant"
 
 
-def test_inner_fits_begin_at_the_best_top_alone(monkeypatch):
+def test_inner_fits_start_only_at_the_best_optimum(monkeypatch):
     data = training(lambda rng, F_n: rng.normal(0, 0.5, F_n.size))
     rows = data.subset
     constant = fit_gp(rows.inputs, rows.F_t)
@@ -94,14 +94,14 @@ def test_tails_keep_the_mean_and_state_their_standard_deviation():
     assert found.scale[0] == pytest.approx(1.0)
 
 
-def test_without_rows_outside_the_chosen_there_are_no_tails():
+def test_without_held_out_rows_there_are_no_tails():
     data = training(lambda rng, F_n: rng.normal(0, 0.5, F_n.size), trials=1)
     everything = TrainingSet(data.rows, data.lengths, np.arange(data.rows.count))
     process = fit_gp(data.subset.inputs, data.subset.F_t)
     assert TailedNoise.of(process, everything) is None
 
 
-def test_the_slope_of_the_tails_agrees_with_differences():
+def test_the_gradient_of_the_tails_agrees_with_differences():
     z = np.random.default_rng(0).standard_t(3.0, 200)
     x, step = np.log([4.0, 0.8]), 1e-6
     for k in (0, 1):
@@ -110,7 +110,7 @@ def test_the_slope_of_the_tails_agrees_with_differences():
         assert tail_cost(x, z)[1][k] == pytest.approx(difference, abs=1e-8)
 
 
-def test_the_cost_of_tails_is_their_density_but_for_a_constant():
+def test_the_tail_objective_is_their_density_up_to_a_constant():
     z = np.random.default_rng(1).normal(size=50)
     normal = Prediction(np.zeros(50), np.ones(50))
     costs = [

@@ -30,14 +30,14 @@ def faults():
 
 
 @pytest.mark.slow
-def test_the_first_task_of_a_process_has_one_thread_too():
+def test_the_first_task_of_a_process_has_one_thread():
     done = subprocess.run(
         [sys.executable, "-c", _FIRST_TASK], capture_output=True, text=True, check=True
     )
     assert done.stdout.strip() == "[1, 1]"
 
 
-def test_a_limit_reaches_all_that_a_process_solves_with():
+def test_a_thread_limit_applies_to_every_solver_library():
     code = (
         "import analysis.gp.regression\n"
         "from threadpoolctl import threadpool_limits\n"
@@ -57,7 +57,7 @@ def test_a_limit_reaches_all_that_a_process_solves_with():
 
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another C library")
-def test_memory_of_a_matrix_is_kept_for_the_next():
+def test_matrix_memory_is_reused():
     from acquisition.linear_algebra import keep_heap
 
     assert keep_heap()
@@ -68,7 +68,7 @@ def test_memory_of_a_matrix_is_kept_for_the_next():
     assert faults() - before < 100 * _MATRIX / 4096 / 4
 
 
-def test_the_program_leaves_cores_to_others():
+def test_the_program_leaves_cores_to_other_processes():
     code = "from experiments.__main__ import main; main(['status', '--help'])"
     asked = (
         "import os, atexit; "

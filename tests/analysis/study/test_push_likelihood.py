@@ -36,7 +36,7 @@ def without_load(table):
     )
 
 
-def test_the_maximum_is_that_of_an_independent_censored_fit():
+def test_the_maximum_agrees_with_an_independent_censored_fit():
     from scipy import stats
 
     law = stats.weibull_min
@@ -99,7 +99,7 @@ def test_gradients_agree_with_differences():
         assert gradient[k] == pytest.approx((ends[0] - ends[1]) / (2 * step), abs=1e-5)
 
 
-def test_a_trial_counted_twice_is_as_good_as_two():
+def test_a_weight_of_two_equals_two_trials():
     table = drawn(trials=3)
     likelihood = CensoredLikelihood(table, 1)
     p = np.array([2.0, 0.4, np.log(0.35), np.log(0.1)])
@@ -123,7 +123,7 @@ def test_known_parameters_are_recovered_through_censoring():
 # --- Kaplan and Meier -----------------------------------------------------------------
 
 
-def test_the_survival_curve_is_that_of_an_independent_one():
+def test_the_survival_curve_agrees_with_an_independent_one():
     from scipy import stats
 
     table = drawn(trials=20)

@@ -3,7 +3,7 @@ import pytest
 
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import TractionSeries
-from analysis.study.pushes import FootPush, PushTable, find_pushes
+from analysis.study.pushes import V_SLIP, FootPush, PushTable, find_pushes
 from tests.analysis.study.pushed import DT, RUNNING, one_push
 
 
@@ -24,48 +24,48 @@ def test_a_push_that_runs_away_is_a_slip_at_its_peak():
     assert not push.is_held
 
 
-def test_a_push_let_go_before_it_slips_is_held_at_its_peak():
+def test_a_push_released_before_slipping_is_censored_at_its_peak():
     (push,) = find_pushes(trial(*one_push(9.0, 6.0)))
     assert push.peak == pytest.approx(6.0)
     assert push.is_held
 
 
-@pytest.mark.parametrize(("speed", "is_held"), [(0.059, True), (0.061, False)])
-def test_motion_above_v_slip_makes_the_slip(speed, is_held):
+@pytest.mark.parametrize(("share", "is_held"), [(0.99, True), (1.01, False)])
+def test_motion_above_v_slip_is_a_slip(share, is_held):
     F_t, v_t = one_push(9.0, 20.0)
-    (push,) = find_pushes(trial(F_t, v_t * speed / RUNNING))
+    (push,) = find_pushes(trial(F_t, v_t * share * V_SLIP / RUNNING))
     assert push.is_held is is_held
 
 
-def test_another_v_slip_gives_another_answer():
+def test_v_slip_is_configurable():
     record = trial(*one_push(9.0, 20.0))
     assert find_pushes(record, v_slip=0.2)[0].is_held
     assert not find_pushes(record, v_slip=0.12)[0].is_held
 
 
 @pytest.mark.parametrize(("height", "count"), [(1.4, 0), (1.6, 1)])
-def test_a_maximum_has_to_stand_out_by_one_and_a_half_newton(height, count):
+def test_a_maximum_needs_an_absolute_prominence(height, count):
     assert len(find_pushes(trial(*one_push(9.0, height)))) == count
 
 
 @pytest.mark.parametrize(("depth", "count"), [(1.7, 1), (2.3, 2)])
-def test_a_maximum_has_to_stand_out_by_a_fifth_of_itself(depth, count):
+def test_a_maximum_needs_a_relative_prominence(depth, count):
     """Two maxima of 10 N with a dip between them."""
     F_t = np.interp(np.arange(1000), [0, 300, 500, 700, 999], [0, 10, 10, 10.1, 0])
     F_t[300:701] = np.interp(np.arange(401), [0, 200, 400], [10, 10 - depth, 10.1])
     assert len(find_pushes(trial(F_t, np.full(1000, 0.01)))) == count
 
 
-def test_the_spike_of_resticking_is_no_push():
+def test_the_spike_of_resticking_is_not_a_push():
     F_t, v_t = one_push(9.0, 20.0)
-    end = int(np.flatnonzero(v_t > 0.06)[-1])
+    end = int(np.flatnonzero(v_t > V_SLIP)[-1])
     spike = np.interp(np.arange(len(F_t)) - end, [0, 20, 40], [0, 5.0, 0.0])
     assert len(find_pushes(trial(F_t + spike, v_t))) == 1
     late = np.interp(np.arange(len(F_t)) - end, [60, 80, 100], [0, 5.0, 0.0])
     assert [p.is_held for p in find_pushes(trial(F_t + late, v_t))] == [False, True]
 
 
-def test_a_peak_is_not_taken_from_before_the_last_slip():
+def test_a_peak_before_the_last_slip_is_not_used():
     first, second = one_push(12.0, 20.0), one_push(6.0, 20.0)
     F_t = np.concatenate([first[0][:-150], second[0][300:]])
     v_t = np.concatenate([first[1][:-150], second[1][300:]])
@@ -73,11 +73,11 @@ def test_a_peak_is_not_taken_from_before_the_last_slip():
     assert peaks == pytest.approx([12.0, 6.0], abs=0.1)
 
 
-def test_rows_prepared_before_have_no_pushes():
+def test_prepared_rows_have_no_pushes():
     assert find_pushes(trial(*one_push(9.0, 20.0), is_prepared=True)) == ()
 
 
-def test_columns_keep_trials_apart_and_light_feet_count_as_one_newton():
+def test_columns_separate_trials_and_have_a_minimum_load():
     pushes = [FootPush(1.0, 5.0, 0.2, False), FootPush(2.0, 7.0, 3.5, True)]
     table = PushTable.of([(0, pushes), (1, []), (1, pushes[:1])])
     assert table.trial.tolist() == [0, 0, 2]

@@ -63,7 +63,7 @@ def contents(folder):
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-def test_a_killed_study_resumes_and_keeps_what_one_run_keeps(tmp_path):
+def test_a_resumed_study_equals_an_uninterrupted_one(tmp_path):
     resumed, alone = tmp_path / "resumed", tmp_path / "alone"
     with started(resumed) as study:
         study.stdout.readline()

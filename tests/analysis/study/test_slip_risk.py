@@ -42,7 +42,7 @@ PLATE = model(
 MODELS = (STONES, PLATE)
 
 
-def test_risk_is_the_share_of_weaker_ground_over_new_trials():
+def test_risk_is_the_share_of_weaker_ground_in_new_trials():
     from scipy import stats
     from scipy.integrate import quad
 
@@ -57,7 +57,7 @@ def test_risk_is_the_share_of_weaker_ground_over_new_trials():
     assert STONES.slip_risk(7.0, 5.0).risk == pytest.approx(exact, abs=1e-5)
 
 
-def test_risk_of_a_sliding_foot_is_that_of_a_normal_force():
+def test_risk_of_a_sliding_foot_follows_a_normal_distribution():
     from scipy.stats import norm
 
     exact = norm.cdf(1.5, 0.3 + 0.35 * 4.0, math.hypot(0.2, 0.15))
@@ -67,7 +67,7 @@ def test_risk_of_a_sliding_foot_is_that_of_a_normal_force():
 
 @pytest.mark.parametrize("known", MODELS)
 @given(share=st.floats(0.01, 0.99), F_n=st.floats(1.0, 12.0))
-def test_the_force_available_at_a_risk_has_that_risk(known, share, F_n):
+def test_the_available_force_at_a_risk_has_that_risk(known, share, F_n):
     force = known.available(F_n, share).force
     if force > 0.0:
         assert known.slip_risk(force, F_n).risk == pytest.approx(share, abs=1e-6)
@@ -94,7 +94,7 @@ def test_the_interval_is_that_of_the_resampled_fits():
     assert force.low < force.force < force.high
 
 
-def test_an_answer_says_what_it_rests_on():
+def test_an_answer_states_its_basis():
     answer = STONES.slip_risk(7.0, 4.0)
     assert (answer.kind, answer.v_slip) == ("break-away", 0.06)
     assert (answer.slips, answer.held) == (60, 12)
@@ -104,11 +104,11 @@ def test_an_answer_says_what_it_rests_on():
     ("required", "F_n", "is_outside"),
     [(7.0, 4.0, False), (7.0, 9.5, True), (7.0, 1.0, True), (25.0, 4.0, True)],
 )
-def test_an_answer_says_whether_it_is_extrapolated(required, F_n, is_outside):
+def test_an_answer_states_whether_it_is_extrapolated(required, F_n, is_outside):
     assert STONES.slip_risk(required, F_n).is_extrapolated is is_outside
 
 
-def test_no_force_at_all_never_slips():
+def test_zero_force_never_slips():
     assert STONES.slip_risk(0.0, 4.0).risk == 0.0
 
 
@@ -117,7 +117,7 @@ BAD = (math.nan, math.inf, -math.inf, -0.1, "a", None, [4.0], 10**400)
 
 @pytest.mark.parametrize("known", MODELS)
 @pytest.mark.parametrize("bad", BAD)
-def test_a_force_that_is_none_is_refused(known, bad):
+def test_an_invalid_force_is_refused(known, bad):
     for call in (
         lambda: known.slip_risk(bad, 4.0),
         lambda: known.slip_risk(4.0, bad),
@@ -128,13 +128,13 @@ def test_a_force_that_is_none_is_refused(known, bad):
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -0.1, 0.0, 1.0, 1.5])
-def test_a_share_that_is_no_risk_is_refused(bad):
+def test_an_invalid_risk_is_refused(bad):
     with pytest.raises(SettingsError, match="between 0 and 1"):
         STONES.available(4.0, bad)
 
 
 @pytest.mark.parametrize("known", MODELS)
-def test_a_stored_model_answers_alike(known):
+def test_a_stored_model_gives_the_same_answers(known):
     stored = BreakAwayModel.from_dict(json.loads(json.dumps(known.to_dict())))
     for F_n in (2.0, 6.0):
         there, here = stored.slip_risk(3.0, F_n), known.slip_risk(3.0, F_n)

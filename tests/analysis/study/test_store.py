@@ -46,13 +46,13 @@ def result(task):
 
 
 @given(ANY)
-def test_plain_values_come_back_exactly(value):
+def test_plain_values_round_trip_exactly(value):
     plain = json.loads(json.dumps(encode(value), allow_nan=False))
     # repr tells -0.0 and nan, which == does not
     assert repr(decode(plain)) == repr(value)
 
 
-def test_arrays_come_back_bit_by_bit():
+def test_arrays_round_trip_bit_for_bit():
     array = np.array([[0.1, -0.0, np.inf], [5e-324, 1 / 3, 2.0]])
     found = decode(json.loads(json.dumps(encode(array))))
     assert found.tobytes() == array.tobytes()
@@ -85,21 +85,21 @@ def test_arrays_come_back_bit_by_bit():
         {},
     ],
 )
-def test_what_is_no_plain_form_is_refused(plain):
+def test_an_invalid_plain_form_is_refused(plain):
     with pytest.raises(ValueError, match=r".+"):
         decode(plain)
 
 
-def test_a_member_of_an_enumeration_comes_back_as_itself():
+def test_an_enumeration_member_round_trips():
     assert decode(encode(Role.BIAS)) is Role.BIAS
 
 
-def test_what_has_no_plain_form_is_not_written():
+def test_a_value_without_a_plain_form_is_not_written():
     with pytest.raises(TypeError, match="set has no plain form"):
         encode({1, 2}.union())
 
 
-def test_a_fold_comes_back_from_disk_as_it_was(tmp_path, task, result):
+def test_a_fold_round_trips_through_disk(tmp_path, task, result):
     store = ResultStore(tmp_path)
     store.put(run_fold, task, result)
     found = store.get(run_fold, task)
@@ -117,13 +117,13 @@ class Foreign:
     value: int
 
 
-def test_a_result_that_could_not_be_read_again_is_refused(tmp_path, task):
+def test_an_unreadable_result_is_not_stored(tmp_path, task):
     with pytest.raises(ValueError, match="Foreign is not of this analysis"):
         ResultStore(tmp_path).put(run_fold, task, {"a": [Foreign(1)]})
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_that_cannot_be_written_keeps_nothing(tmp_path, task, result):
+def test_an_unwritable_folder_stores_nothing(tmp_path, task, result):
     (tmp_path / "file").write_text("in the way")
     store = ResultStore(tmp_path / "file" / "results")
     store.put(run_fold, task, result)
@@ -179,20 +179,20 @@ def test_equal_values_have_equal_keys_whatever_objects_they_share(task):
 
 
 @pytest.mark.parametrize("value", [np.float64(1.5), np.int64(3), np.bool_(True)])
-def test_a_number_has_the_same_key_when_the_store_gives_it_back(value):
+def test_a_restored_number_has_the_same_key(value):
     again = decode(encode([value]))
     assert task_key(run_fold, [value]) == task_key(run_fold, again)
     assert task_key(run_fold, [value]) != task_key(run_fold, [value.item() + 1])
 
 
 @pytest.mark.parametrize("value", [object(), np.array([object()])])
-def test_what_has_no_known_content_has_no_key(value):
+def test_a_value_of_unknown_content_has_no_key(value):
     with pytest.raises(TypeError, match="no plain form"):
         task_key(run_fold, [value])
 
 
 @pytest.mark.parametrize("damage", [b"", b"{}", b"[1", b'{"digest": 1, "result": 2}'])
-def test_a_damaged_file_counts_as_not_there(tmp_path, task, result, damage):
+def test_a_damaged_file_counts_as_missing(tmp_path, task, result, damage):
     store = ResultStore(tmp_path)
     store.put(run_fold, task, result)
     (path,) = tmp_path.iterdir()
@@ -200,7 +200,7 @@ def test_a_damaged_file_counts_as_not_there(tmp_path, task, result, damage):
     assert store.get(run_fold, task) is None
 
 
-def test_a_flipped_digit_is_noticed(tmp_path, task, result):
+def test_a_flipped_digit_is_detected(tmp_path, task, result):
     store = ResultStore(tmp_path)
     store.put(run_fold, task, result)
     (path,) = tmp_path.iterdir()
@@ -224,7 +224,7 @@ def left(folder):
     return {path.name for path in folder.iterdir()}
 
 
-def test_what_was_used_longest_ago_goes_when_the_folder_is_full(tmp_path):
+def test_the_least_recently_used_result_is_evicted(tmp_path):
     paths = filled(tmp_path, 10)
     assert remove_oldest(tmp_path, 9_999) == 8000
     assert left(tmp_path) == {path.name for path in paths[2:]}
@@ -264,13 +264,13 @@ def test_a_result_that_was_read_counts_as_used(tmp_path, task, result):
     assert not newer[0].exists()
 
 
-def test_what_a_killed_study_left_half_written_goes_too(tmp_path):
+def test_partial_files_of_a_killed_study_are_removed(tmp_path):
     (tmp_path / ".0123.json.abc").write_bytes(bytes(1000))
     assert remove_oldest(tmp_path, 500) == 0
     assert left(tmp_path) == set()
 
 
-def test_what_is_no_result_is_left_alone(tmp_path):
+def test_foreign_files_are_left_alone(tmp_path):
     (tmp_path / "notes.txt").write_bytes(bytes(5000))
     filled(tmp_path, 2)
     remove_oldest(tmp_path, 100)
@@ -278,7 +278,7 @@ def test_what_is_no_result_is_left_alone(tmp_path):
 
 
 @pytest.mark.parametrize("what", ["folder", "link", "pipe", "huge", "unreadable"])
-def test_a_name_that_holds_no_result_is_no_error(tmp_path, task, result, what):
+def test_a_name_without_a_result_is_not_an_error(tmp_path, task, result, what):
     store, folder = ResultStore(tmp_path / "folds"), tmp_path / "folds"
     store.put(run_fold, task, result)
     (path,) = folder.iterdir()
@@ -301,7 +301,7 @@ def test_a_name_that_holds_no_result_is_no_error(tmp_path, task, result, what):
 
 
 @pytest.mark.parametrize("model", list(MODELS))
-def test_every_model_of_the_registry_comes_back_from_disk(tmp_path, task, model):
+def test_every_registered_model_round_trips_through_disk(tmp_path, task, model):
     one = replace(task, options=replace(task.options, models=(model,)))
     store, fold = ResultStore(tmp_path), run_fold(one)
     store.put(run_fold, one, fold)

@@ -34,9 +34,7 @@ def test_models_of_stones_fail_on_a_plate(small_study):
     assert cross["S0"]["S0"] == small_study.terrains["S0"].mae(TUSTIN)
 
 
-def test_trials_that_contradict_each_other_about_the_stones_are_warned_of(
-    make_series, moving
-):
+def test_trials_with_contradicting_stones_give_a_warning(make_series, moving):
     trials = [
         replace(make_series(moving, seed=k), stones=stones)
         for k, stones in enumerate(("small", "big"))
@@ -105,7 +103,7 @@ def test_results_are_identical_bit_by_bit_for_two_workers(small_study, slice_tri
     assert one == two
 
 
-def test_break_away_is_fitted_and_kept_where_it_is_asked_for(slice_trials):
+def test_break_away_is_fitted_and_stored_on_request(slice_trials):
     trials, kept = {"TF": slice_trials["TF"]}, []
     store = SimpleNamespace(
         get=lambda function, task: None,
@@ -119,7 +117,7 @@ def test_break_away_is_fitted_and_kept_where_it_is_asked_for(slice_trials):
     assert run_study(trials, OPTIONS, simulated=True).break_away == {}
 
 
-def test_a_terrain_is_fitted_alike_alone_and_in_company(small_study, slice_trials):
+def test_a_terrain_is_fitted_independently_of_others(small_study, slice_trials):
     options = StudyOptions(fit=replace(SMALL_FIT, models=TWO), n_jobs=1)
     alone = run_study({"TF": slice_trials["TF"]}, options, simulated=True)
     expected = small_study.terrains["TF"].maes(GP_SE)
@@ -140,7 +138,7 @@ def test_one_trial_is_reported_but_not_fitted(make_series, moving):
     json.dumps(to_fits(study), allow_nan=False)
 
 
-def test_a_trial_that_only_sticks_is_left_out_and_the_rest_is_done(make_series, moving):
+def test_a_trial_that_only_sticks_is_left_out(make_series, moving):
     stuck = make_series(np.zeros(500), name="stuck")
     trials = [make_series(moving), stuck, make_series(moving, seed=1)]
     study = run_study({"S0": trials}, OPTIONS, simulated=False)
@@ -159,7 +157,7 @@ def test_constant_load_is_warned_about_and_fitted(make_series, moving):
     assert any("F_n never varies" in warning for warning in study.warnings)
 
 
-def test_ten_samples_are_too_few_and_say_so(make_series):
+def test_too_few_samples_are_reported(make_series):
     trials = [make_series(np.full(10, 0.05), seed=k) for k in range(3)]
     study = run_study({"S0": trials}, OPTIONS, simulated=False)
     assert study.terrains["S0"].mae(TUSTIN) is None
@@ -168,7 +166,7 @@ def test_ten_samples_are_too_few_and_say_so(make_series):
     assert study.terrains["S0"].constant_mae is not None
 
 
-def test_force_that_never_varies_leaves_only_tustin(moving):
+def test_a_constant_force_leaves_only_tustin(moving):
     t = 0.002 * np.arange(moving.size)
     trials = [
         TractionSeries("S0", "flat", t, moving, 4 + np.sin(t), np.full(t.size, 2.0))
@@ -213,7 +211,7 @@ def test_terrains_with_unequal_numbers_of_trials_are_compared(make_series, movin
 @pytest.mark.parametrize(
     ("container", "is_named"), [(None, False), (0.46, True), (0.43, False)]
 )
-def test_trials_too_short_to_count_are_warned_about(make_series, container, is_named):
+def test_trials_too_short_to_count_give_a_warning(make_series, container, is_named):
     # 5 s at 0.08 m/s: 500 kept samples, 0.40 m
     trials = [make_series(np.full(2501, 0.08), seed=k) for k in range(2)]
     prepare = PrepareOptions(container_travel=container)

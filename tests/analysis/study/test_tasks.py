@@ -32,7 +32,7 @@ def test_progress_counts_every_task():
     assert seen == [(1, 3), (2, 3), (3, 3)]
 
 
-def test_no_tasks_are_no_trouble():
+def test_an_empty_list_of_tasks_is_accepted():
     assert run_tasks(square, [], None) == []
 
 
@@ -46,7 +46,7 @@ def miss(number):
     raise TrialFileError(Path(f"T0{number}.mcap"), "is no trial", hint="Leave it out.")
 
 
-def test_an_error_of_a_worker_keeps_what_it_says():
+def test_an_error_of_a_worker_keeps_its_message():
     with pytest.raises(TrialFileError, match=r"mcap: is no trial") as caught:
         run_tasks(miss, [1, 2, 3, 4], 2)
     assert caught.value.path.name in {"T01.mcap", "T02.mcap", "T03.mcap", "T04.mcap"}
@@ -59,7 +59,7 @@ def end_at_three(number):
     return number
 
 
-def test_a_worker_that_ends_is_told_with_its_signal_and_others_follow():
+def test_a_worker_that_dies_is_reported_with_its_signal_and_replaced():
     with pytest.raises(WorkerLostError, match="ended unexpectedly: SIGKILL"):
         run_tasks(end_at_three, [1, 2, 3, 4, 5], 2)
     assert run_tasks(square, [1, 2, 3, 4], 2) == [1, 4, 9, 16]
@@ -79,7 +79,7 @@ class Memory:
 
 
 @pytest.mark.parametrize("n_jobs", [1, 2])
-def test_batches_come_back_each_in_its_own_order_and_are_counted_together(n_jobs):
+def test_batches_keep_their_order_and_share_one_progress(n_jobs):
     batches = [Batch(square, [3, 2]), Batch(square, []), Batch(str, [7, 8, 9])]
     seen, store = [], Memory()
     found = run_batches(
@@ -96,7 +96,7 @@ def test_batches_come_back_each_in_its_own_order_and_are_counted_together(n_jobs
     }
 
 
-def test_only_what_is_not_kept_is_done():
+def test_only_unstored_tasks_are_run():
     store = Memory()
     store.results = {(fail, 1): 10, (fail, 2): 20}
     assert run_tasks(fail, [2, 1], 1, store=store) == [20, 10]
@@ -106,7 +106,7 @@ def stop(number):
     raise KeyboardInterrupt
 
 
-def test_what_was_done_before_an_interruption_is_kept():
+def test_results_from_before_an_interruption_are_kept():
     store = Memory()
     with pytest.raises(KeyboardInterrupt):
         run_batches([Batch(square, [3]), Batch(stop, [1])], 1, store=store)
@@ -117,14 +117,14 @@ def itself(values):
     return values
 
 
-def test_arrays_go_to_workers_and_come_back_bit_by_bit():
+def test_arrays_round_trip_through_workers_bit_for_bit():
     values = np.random.default_rng(0).normal(size=300_000)
     for found in run_tasks(itself, [values, values], 2):
         assert type(found) is np.ndarray
         assert found.tobytes() == values.tobytes()
 
 
-def test_few_tasks_are_given_to_the_processes_that_run_already():
+def test_few_tasks_use_the_running_processes():
     run_tasks(square, [1, 2, 3, 4], 2)
     assert running_workers() >= 2
     assert Workers().count(2) == running_workers()

@@ -45,7 +45,7 @@ def known():
     return fit_components(drawn(20, between=1.5, within=1.0, tau=0.3, noise=0.2))
 
 
-def test_the_components_that_made_the_trials_are_recovered(known):
+def test_the_true_variance_components_are_recovered(known):
     # twenty trials show a spread between them to 16 %
     assert known.between == pytest.approx(1.5, rel=0.5)
     assert known.within == pytest.approx(1.0, rel=0.3)
@@ -62,7 +62,7 @@ def test_every_component_has_an_interval_around_it(known, name):
     assert interval.upper / interval.lower > 1.1
 
 
-def test_trials_that_do_not_differ_are_not_told_apart():
+def test_equal_trials_have_no_spread():
     same = fit_components(drawn(8, 0.0, 1.0, 0.3, 0.2, seed=3, draws=0))
     assert same.intervals == {}
     assert not same.is_distinguishable
@@ -74,11 +74,11 @@ def test_the_same_task_gives_the_same_components():
     assert again == first
 
 
-def test_two_trials_show_no_spread_between_them():
+def test_two_trials_give_no_spread():
     assert fit_components(drawn(2, 1.0, 1.0, 0.3, 0.2)) is None
 
 
-def test_more_trials_show_the_level_better_by_the_root_of_their_number():
+def test_the_level_error_falls_with_the_root_of_the_trials():
     ends = Interval(0.0, 1.0)
     components = TrialComponents(
         10, 8.0, between=0.6, within=1.0, tau=0.5, measurement=0.1,
@@ -89,7 +89,7 @@ def test_more_trials_show_the_level_better_by_the_root_of_their_number():
     assert components.level_sd(9) == pytest.approx(components.level_sd(1) / 3.0)
 
 
-def test_residuals_are_those_of_rows_that_the_function_did_not_see():
+def test_residuals_are_of_held_out_rows():
     seen = []
     for seed in range(12):
         task = drawn(3, 0.0, 0.0, 0.1, 0.5, seed, draws=0)

@@ -53,7 +53,7 @@ def script(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["SIGKILL", "SIGTERM", "SIGINT"])
-def test_workers_end_with_their_parent_whatever_they_do(script, name):
+def test_workers_always_end_with_their_parent(script, name):
     script.write_text(WAITING)
     with started(script) as parent:
         assert parent.stdout.readline() == "busy\n"
@@ -64,7 +64,7 @@ def test_workers_end_with_their_parent_whatever_they_do(script, name):
 
 
 @pytest.mark.parametrize("script_text", [WAITING, STARTING])
-def test_a_key_that_interrupts_reaches_the_parent_alone(script, script_text):
+def test_an_interrupt_key_reaches_only_the_parent(script, script_text):
     script.write_text(script_text)
     with started(script) as parent:
         assert parent.stdout.readline() == "busy\n"

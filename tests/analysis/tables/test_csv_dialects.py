@@ -45,7 +45,7 @@ def test_every_dialect_is_tested(expected):
 
 
 @pytest.mark.parametrize("dialect", DIALECTS)
-def test_a_dialect_is_read_or_refused_as_it_is_described(folder, expected, dialect):
+def test_a_dialect_is_read_or_refused_as_described(folder, expected, dialect):
     path, wanted = folder / f"{dialect}.csv", expected[dialect]
     stated = STATED.get(dialect, {})
     if wanted["want"] == "refused":
@@ -60,6 +60,6 @@ def test_a_dialect_is_read_or_refused_as_it_is_described(folder, expected, diale
 
 
 @pytest.mark.parametrize("dialect", [n for n in STATED if n != "negative_load"])
-def test_a_dialect_that_nothing_states_is_refused_with_a_line(folder, dialect):
+def test_an_ambiguous_dialect_is_refused_with_one_line(folder, dialect):
     with pytest.raises(SettingsError, match=rf"{dialect}\.csv, line \d+"):
         load_tables([folder / f"{dialect}.csv"])

@@ -67,14 +67,14 @@ def test_one_changed_digit_is_named(tmp_path):
             load_tables([path])
 
 
-def test_a_file_that_was_cut_is_named_with_both_sizes(tmp_path):
+def test_a_truncated_file_is_named_with_both_sizes(tmp_path):
     file = write_package(tmp_path)
     file.write_text(ROWS[:-5])
     with pytest.raises(SettingsError, match=f"{len(ROWS) - 5} bytes.*{len(ROWS)}"):
         load_tables([tmp_path])
 
 
-def test_a_file_that_is_missing_is_named(tmp_path):
+def test_a_missing_file_is_named(tmp_path):
     write_package(tmp_path).unlink()
     with pytest.raises(SettingsError, match=r"T01\.csv"):
         load_tables([tmp_path])
@@ -87,7 +87,7 @@ def test_a_path_that_leads_out_of_the_package_is_refused(tmp_path, path):
         load_tables([tmp_path])
 
 
-def test_a_link_in_the_place_of_a_table_is_not_followed(tmp_path):
+def test_a_link_instead_of_a_table_is_not_followed(tmp_path):
     file = write_package(tmp_path)
     file.rename(tmp_path / "elsewhere.csv")
     file.symlink_to(tmp_path / "elsewhere.csv")
@@ -95,7 +95,7 @@ def test_a_link_in_the_place_of_a_table_is_not_followed(tmp_path):
         load_tables([tmp_path])
 
 
-def test_a_folder_of_a_package_may_be_no_link(tmp_path):
+def test_a_package_folder_may_not_be_a_link(tmp_path):
     write_package(tmp_path)
     (tmp_path / "S1").rename(tmp_path / "S2")
     (tmp_path / "S1").symlink_to(tmp_path / "S2")
@@ -115,7 +115,7 @@ def test_a_folder_of_a_package_may_be_no_link(tmp_path):
         '{"name": "p", "resources": [{"bytes": -1}]}',
     ],
 )
-def test_what_is_no_package_is_refused_by_name(tmp_path, text):
+def test_an_invalid_package_is_refused_by_name(tmp_path, text):
     (tmp_path / DESCRIPTOR).write_text(text)
     with pytest.raises(SettingsError, match=DESCRIPTOR):
         load_tables([tmp_path])
@@ -151,7 +151,7 @@ def parquet(path: Path, content=None, units=None) -> Path:
     return path
 
 
-def test_units_of_a_parquet_column_count(tmp_path):
+def test_units_of_a_parquet_column_are_converted(tmp_path):
     path = parquet(tmp_path / "a.parquet", units={"v_t": "mm/s"})
     ((_, (trial,)),) = load_tables([path]).items()
     assert trial.v_t[:2] == pytest.approx([0.010, 0.011])
@@ -167,20 +167,20 @@ def test_parquet_columns_can_be_named(tmp_path):
     assert trial.F_n.max() == 4.0
 
 
-def test_a_parquet_table_of_other_columns_says_which_it_has(tmp_path):
+def test_a_parquet_table_of_other_columns_is_reported_with_its_columns(tmp_path):
     path = parquet(tmp_path / "a.parquet", {"x": np.arange(5.0)})
     with pytest.raises(SettingsError, match=r"no column t, v_t, F_n, F_t; it has x"):
         load_tables([path])
 
 
-def test_words_in_the_place_of_numbers_are_refused(tmp_path):
+def test_words_instead_of_numbers_are_refused(tmp_path):
     content = columns() | {"F_t": np.array(list("abcdef"))}
     with pytest.raises(SettingsError, match="column F_t holds string"):
         load_tables([parquet(tmp_path / "a.parquet", content)])
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
-def test_a_parquet_file_that_was_cut_is_refused(tmp_path, share):
+def test_a_truncated_parquet_file_is_refused(tmp_path, share):
     path = parquet(tmp_path / "a.parquet")
     content = path.read_bytes()
     path.write_bytes(content[: int(share * len(content))])
@@ -188,7 +188,7 @@ def test_a_parquet_file_that_was_cut_is_refused(tmp_path, share):
         load_tables([path])
 
 
-def test_a_small_file_of_too_many_rows_is_not_unpacked(tmp_path):
+def test_a_small_file_with_too_many_rows_is_not_unpacked(tmp_path):
     zeros = np.zeros(MOST_ROWS + 1)
     path = parquet(tmp_path / "a.parquet", dict.fromkeys(columns(), zeros))
     assert path.stat().st_size < 1_000_000
@@ -196,13 +196,13 @@ def test_a_small_file_of_too_many_rows_is_not_unpacked(tmp_path):
         load_tables([path])
 
 
-def test_a_time_of_its_own_takes_no_rate(tmp_path):
+def test_a_table_with_a_time_column_takes_no_rate(tmp_path):
     path = parquet(tmp_path / "a.parquet")
     with pytest.raises(SettingsError, match="time of its own"):
         load_tables([path], rate=500.0)
 
 
-def test_an_origin_that_is_none_is_left_out(tmp_path):
+def test_an_invalid_origin_is_omitted(tmp_path):
     import pyarrow
     import pyarrow.parquet
 

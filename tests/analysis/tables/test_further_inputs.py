@@ -84,7 +84,7 @@ def test_inputs_are_smoothed_as_the_forces_are():
     assert smooth.further["angle"].tolist() == smooth.F_t.tolist()
 
 
-def test_processes_take_further_inputs_and_tustin_has_no_place_for_them(tmp_path):
+def test_processes_accept_further_inputs_and_tustin_does_not(tmp_path):
     path = a_table(tmp_path / "runs.csv", wheels=("a",))
     options = StudyOptions(
         AS_THEY_ARE, fit=FitOptions(models=(TUSTIN, GP_SE), draws=0), n_jobs=1
@@ -103,7 +103,7 @@ def test_processes_take_further_inputs_and_tustin_has_no_place_for_them(tmp_path
     assert at_mean == pytest.approx(2.0 * model.process.centre[2], abs=0.2)
 
 
-def test_trials_with_other_inputs_are_no_study_together(tmp_path):
+def test_trials_with_different_inputs_are_not_combined(tmp_path):
     path = a_table(tmp_path / "runs.csv", wheels=("a",))
     trials = load(path) | {"b": load_tables([path], COLUMNS, rate=1.0)["a"]}
     with pytest.raises(SettingsError, match=r"differ in their inputs: angle; none"):
@@ -124,12 +124,12 @@ def test_trials_with_other_inputs_are_no_study_together(tmp_path):
         ("v_t,F_n,simulated", "is not an input"),
     ],
 )
-def test_a_list_that_is_none_of_inputs_is_refused(text, reason):
+def test_an_invalid_list_of_inputs_is_refused(text, reason):
     with pytest.raises(SettingsError, match=reason):
         parse_inputs(text)
 
 
-def test_a_table_without_the_input_names_what_it_has(tmp_path):
+def test_a_missing_input_is_reported_with_the_available_columns(tmp_path):
     path = a_table(tmp_path / "runs.csv")
     with pytest.raises(SettingsError, match="no column skid") as refused:
         load_tables([path], COLUMNS, rate=1.0, inputs=("skid",))
@@ -138,7 +138,7 @@ def test_a_table_without_the_input_names_what_it_has(tmp_path):
     )
 
 
-def test_an_input_whose_name_stands_twice_is_taken_by_its_place(tmp_path):
+def test_an_input_with_a_duplicated_name_is_taken_by_position(tmp_path):
     path = a_table(tmp_path / "runs.csv")
     header, _, rows = path.read_text().partition("\n")
     wide = "\n".join(f"{row},7" for row in rows.split())
@@ -152,7 +152,7 @@ def test_an_input_whose_name_stands_twice_is_taken_by_its_place(tmp_path):
     assert set(trials["a"][0].further["7"]) == {7.0}
 
 
-def test_an_input_that_models_cannot_compute_with_is_refused(tmp_path):
+def test_a_non_numeric_input_is_refused(tmp_path):
     path = a_table(tmp_path / "runs.csv")
     lines = path.read_text().splitlines()
     lines[7] = lines[7].rpartition(",")[0] + ",1e300"
@@ -181,7 +181,7 @@ def test_a_column_is_named_once():
         parse_columns("trial=repeat,trial=wheel")
 
 
-def test_a_row_that_names_no_trial_is_refused_with_its_line(tmp_path):
+def test_a_row_without_a_trial_is_refused_with_its_line(tmp_path):
     path = a_table(tmp_path / "runs.csv")
     lines = path.read_text().splitlines()
     lines[3] = lines[3].replace("a,3", "a,", 1)
@@ -207,7 +207,7 @@ def test_an_npz_has_no_further_columns(tmp_path):
 
 
 @pytest.mark.shared_data
-def test_a_dragged_wheel_is_foretold_once_its_heading_and_slip_are_inputs(shared_data):
+def test_a_dragged_wheel_is_predicted_with_heading_and_slip_as_inputs(shared_data):
     path = shared_data / "real" / "cmu_steady" / "runs.csv"
     columns = parse_columns(
         "v_t=slide_mm_s,F_n=Fz_N,F_t=Ft_N,trial=repeat,terrain=wheel"

@@ -82,7 +82,7 @@ def test_errors_across_terrains_agree(fits, expected, model):
 
 
 @pytest.mark.parametrize("terrain", STONES + PLATES)
-def test_all_five_models_predict_alike(fits, terrain):
+def test_all_models_predict_alike(fits, terrain):
     maes = fits["terrains"][terrain]["mae"]
     assert list(maes) == list(PAPER_MODELS)
     # the paper's Fig. 9: no model stands out
@@ -90,7 +90,7 @@ def test_all_five_models_predict_alike(fits, terrain):
 
 
 @pytest.mark.parametrize("terrain", STONES + PLATES)
-def test_bands_of_every_model_hold_about_their_share(fits, terrain):
+def test_bands_of_every_model_have_about_nominal_coverage(fits, terrain):
     low, high = (0.85, 0.95) if terrain in STONES else (0.75, 0.97)
     for share in fits["terrains"][terrain]["coverage90"].values():
         assert low <= share <= high
@@ -105,7 +105,7 @@ def chosen(shared_data):
 
 @pytest.mark.long
 @pytest.mark.timeout(1200)
-def test_chosen_noise_helps_on_stones_and_does_no_harm_on_plates(chosen):
+def test_selected_noise_helps_on_stones_and_not_hurts_on_plates(chosen):
     nlpd = {name: result["nlpd"] for name, result in chosen.items()}
     gains = [nlpd[name][GP_SE] - nlpd[name][GP_SE_NOISE] for name in STONES]
     assert np.mean(gains) >= 0.03
@@ -117,7 +117,7 @@ def test_chosen_noise_helps_on_stones_and_does_no_harm_on_plates(chosen):
 @pytest.mark.long
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("terrain", STONES + PLATES)
-def test_bands_with_chosen_noise_hold_about_their_share(chosen, terrain):
+def test_bands_with_selected_noise_have_about_nominal_coverage(chosen, terrain):
     low, high = (0.85, 0.95) if terrain in STONES else (0.75, 0.97)
     assert low <= chosen[terrain]["coverage90"][GP_SE_NOISE] <= high
 
@@ -131,7 +131,7 @@ def test_real_contour_trials_are_hardly_better_than_a_constant(contour):
     assert "not identifiable" in " ".join(table_one(study).rows[0])
 
 
-def test_real_contour_trials_have_the_error_found_before(contour):
+def test_real_contour_trials_reproduce_the_earlier_error(contour):
     pressed = [
         TractionSeries(s.terrain, s.name, s.t[p], s.v_t[p], s.F_n[p], s.F_t[p])
         for s in contour

@@ -47,7 +47,7 @@ def test_csv_is_read_with_renamed_columns_in_any_order(tmp_path):
     assert series.t[2] == 0.2
 
 
-def test_csv_without_a_terrain_is_called_table(tmp_path):
+def test_a_csv_without_a_terrain_is_named_table(tmp_path):
     assert list(load_tables([write(tmp_path, GOOD)])) == ["table"]
 
 
@@ -96,7 +96,7 @@ def test_units_unknown_or_contradicted_are_refused(tmp_path, header, units, reas
 @pytest.mark.parametrize(
     "header", ["t,v_t [m/s],v_t [mm/s],F_n,F_t", "t,v_t,v_t,F_n,F_t"]
 )
-def test_a_column_that_stands_there_twice_is_refused(tmp_path, header):
+def test_a_duplicated_column_is_refused(tmp_path, header):
     path = write(tmp_path, header + "\n0,0.1,100,2,1\n1,0.1,100,2,1\n2,0.1,100,2,1\n")
     with pytest.raises(SettingsError, match="v_t occurs twice"):
         load_tables([path])
@@ -111,23 +111,23 @@ def test_a_number_with_comma_and_point_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("text", "lines"), [("1", {1}), ("1-3,5", {1, 2, 3, 5}), (" 2 , 4", {2, 4})]
 )
-def test_lines_are_listed_singly_or_from_to(text, lines):
+def test_line_lists_contain_numbers_and_ranges(text, lines):
     assert parse_lines(text) == lines
 
 
 @pytest.mark.parametrize("text", ["0", "3-1", "x", "1-", "1-99999999", "-2"])
-def test_a_list_of_lines_that_is_none_is_refused(text):
+def test_an_invalid_line_list_is_refused(text):
     with pytest.raises(SettingsError, match=r"--skip .* is no line"):
         parse_lines(text)
 
 
 @pytest.mark.parametrize("text", ['"v_t=a', 't=t_s,"v_t="a"'])
-def test_quotes_of_an_option_that_do_not_close_are_refused(text):
+def test_unclosed_quotes_in_an_option_are_refused(text):
     with pytest.raises(SettingsError, match="quotes do not fit"):
         parse_columns(text)
 
 
-def test_an_item_with_a_comma_stands_in_quotes():
+def test_an_item_with_a_comma_may_be_quoted():
     assert parse_columns('t=t_s,"v_t=Speed, foot"')["v_t"] == "Speed, foot"
     assert parse_inputs('v_t,F_n,"Skid, deg"') == ("Skid, deg",)
 
@@ -138,7 +138,7 @@ def test_a_unit_that_a_column_cannot_have_is_refused(text):
         parse_units(text)
 
 
-def test_byte_order_mark_and_quotes_do_no_harm(tmp_path):
+def test_byte_order_mark_and_quotes_are_accepted(tmp_path):
     text = "\ufeff" + GOOD.replace("t,v_t", '"t","v_t"')
     assert load_tables([write(tmp_path, text)])["table"][0].t.size == 3
 
@@ -155,7 +155,7 @@ def test_byte_order_mark_and_quotes_do_no_harm(tmp_path):
         (b"PK\x03\x04 and then nothing of the sort", "not a readable npz"),
     ],
 )
-def test_a_file_that_is_no_table_is_refused_by_name(tmp_path, content, reason):
+def test_a_file_that_is_not_a_table_is_refused_by_name(tmp_path, content, reason):
     with pytest.raises(SettingsError, match=r"trial\.csv.*" + reason):
         load_tables([write(tmp_path, content)])
 
@@ -170,12 +170,12 @@ def test_a_folder_is_refused(tmp_path):
         load_tables([tmp_path])
 
 
-def test_no_file_at_all_is_refused():
+def test_an_empty_list_of_files_is_refused():
     with pytest.raises(SettingsError, match="No table"):
         load_tables([])
 
 
-def test_zip_that_is_no_npz_is_refused_with_what_it_holds(tmp_path):
+def test_a_zip_that_is_not_an_npz_is_refused_with_its_contents(tmp_path):
     path = tmp_path / "a.npz"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("readme.txt", "hello")
@@ -227,7 +227,7 @@ def test_npz_that_unpacks_beyond_the_limit_is_refused_unopened(tmp_path, monkeyp
         load_tables([path])
 
 
-def test_many_trials_in_an_npz_are_read_as_far_as_memory_goes(tmp_path, monkeypatch):
+def test_many_trials_in_an_npz_are_limited_only_by_memory(tmp_path, monkeypatch):
     path, rng = tmp_path / "a.npz", np.random.default_rng(0)
     t = 0.002 * np.arange(300_000.0)
     made = {f"S0/{k}": np.column_stack([t, rng.random((t.size, 3))]) for k in range(3)}
@@ -240,12 +240,12 @@ def test_many_trials_in_an_npz_are_read_as_far_as_memory_goes(tmp_path, monkeypa
 
 
 @pytest.mark.parametrize("text", ["t", "speed=v", "t=", "=x"])
-def test_columns_that_name_nothing_are_refused(text):
+def test_unmatched_column_names_are_refused(text):
     with pytest.raises(SettingsError, match="does not name a column"):
         parse_columns(text)
 
 
-def test_stones_are_given_by_terrain_and_otherwise_unknown(tmp_path):
+def test_stones_are_stated_by_terrain_and_otherwise_unknown(tmp_path):
     path = tmp_path / "a.npz"
     np.savez(path, **{"Sand/00": rows(), "Beach/00": rows(), "moon/00": rows()})
     trials = load_tables([path], stones=parse_stones("Sand=none, Beach=small"))
@@ -254,7 +254,7 @@ def test_stones_are_given_by_terrain_and_otherwise_unknown(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["Sand", "Sand=", "=none", "Sand=gravel"])
-def test_stones_of_no_size_are_refused(text):
+def test_stones_without_a_size_are_refused(text):
     with pytest.raises(SettingsError, match="does not give the stones"):
         parse_stones(text)
 
@@ -263,7 +263,7 @@ def test_stones_of_no_size_are_refused(text):
 @given(
     noise=st.binary(max_size=300), start=st.sampled_from([b"", b"PK\x03\x04", b"t,"])
 )
-def test_any_bytes_are_read_or_refused_but_never_crash(tmp_path, noise, start):
+def test_any_bytes_are_read_or_refused(tmp_path, noise, start):
     path = write(tmp_path, start + noise, "noise")
     with pytest.raises(SettingsError):
         load_tables([path])
@@ -271,7 +271,7 @@ def test_any_bytes_are_read_or_refused_but_never_crash(tmp_path, noise, start):
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
 @given(index=st.integers(0, 600), value=st.integers(0, 255))
-def test_npz_with_a_wrong_byte_is_read_or_refused(tmp_path, index, value):
+def test_an_npz_with_a_wrong_byte_is_read_or_refused(tmp_path, index, value):
     stream = io.BytesIO()
     np.savez(stream, **{"S0/00": rows()})
     content = bytearray(stream.getvalue())
@@ -298,17 +298,17 @@ def test_rows_without_a_time_and_a_rate_say_how_to_give_it(tmp_path):
     assert "--rate" in refused.value.hint
 
 
-def test_a_rate_beside_a_time_is_refused(tmp_path):
+def test_a_rate_together_with_a_time_is_refused(tmp_path):
     with pytest.raises(SettingsError, match="a time column"):
         load_tables([write(tmp_path, GOOD)], rate=200.0)
 
 
-def test_a_rate_beside_an_npz_is_refused(slice_path):
+def test_a_rate_together_with_an_npz_is_refused(slice_path):
     with pytest.raises(SettingsError, match="a time of its own"):
         load_tables([slice_path], rate=200.0)
 
 
-def test_a_table_of_kept_samples_is_known_by_its_column(tmp_path):
+def test_a_table_of_kept_samples_is_recognised_by_its_column(tmp_path):
     header, rest = GOOD.split("\n", 1)
     rows = [f"{row},{k}" for k, row in enumerate(rest.strip().split("\n"))]
     path = write(tmp_path, "\n".join([f"{header},kept_row [1]", *rows, ""]))
@@ -317,13 +317,13 @@ def test_a_table_of_kept_samples_is_known_by_its_column(tmp_path):
 
 
 @pytest.mark.parametrize("rate", [0, -200.0, np.nan, np.inf, True, "200"])
-def test_a_rate_that_is_none_is_refused(tmp_path, rate):
+def test_an_invalid_rate_is_refused(tmp_path, rate):
     path = write(tmp_path, "v_t,F_n,F_t\n" + "0.1,2,1\n" * 5)
     with pytest.raises(SettingsError, match="is not a rate"):
         load_tables([path], rate=rate)
 
 
 @pytest.mark.parametrize("rate", [200, np.float64(200.0), np.int64(200)])
-def test_a_rate_may_be_any_number(tmp_path, rate):
+def test_any_positive_rate_is_accepted(tmp_path, rate):
     path = write(tmp_path, "v_t,F_n,F_t\n" + "0.1,2,1\n" * 5)
     assert load_tables([path], rate=rate)["table"][0].t[1] == 0.005

@@ -36,7 +36,7 @@ def changed(path, tmp_path, change):
 
 
 @pytest.mark.parametrize("name", ["S0", "B0", "TF"])
-def test_the_database_answers_from_rest_as_the_fit_does(fitted, path, name):
+def test_answers_from_rest_agree_with_the_fit(fitted, path, name):
     known = load(path).terrain(name)
     here, there = known.slip_risk(4.0, 3.5), fitted[name].slip_risk(4.0, 3.5)
     assert here.risk == pytest.approx(there.risk, abs=1e-4)
@@ -49,24 +49,24 @@ def test_the_database_answers_from_rest_as_the_fit_does(fitted, path, name):
     )
 
 
-def test_stones_break_away_and_a_plate_that_hardly_slips_slides(fitted, path):
+def test_stones_have_a_break_away_model_and_a_smooth_plate_has_sliding(fitted, path):
     database = load(path)
     kinds = {name: database.terrain(name).slip_risk(4.0, 3.5).kind for name in fitted}
     assert kinds == {"S0": "break-away", "B0": "break-away", "TF": "sliding"}
 
 
-def test_the_force_available_has_the_risk_that_was_asked_for(path):
+def test_the_available_force_has_the_requested_risk(path):
     known = load(path).terrain("S0")
     force = known.from_rest.available(3.5, 0.1).force
     assert known.slip_risk(force, 3.5).risk == pytest.approx(0.1, abs=1e-6)
 
 
-def test_a_foot_in_motion_meets_less_than_one_at_rest_may_ask_for(path):
+def test_a_moving_foot_has_less_force_than_one_at_rest(path):
     known = load(path).terrain("S0")
     assert known.risk_in_motion(6.0, 3.5) > 1.5 * known.slip_risk(6.0, 3.5).risk
 
 
-def test_what_was_not_pushed_from_rest_answers_in_motion_only(path, tmp_path):
+def test_terrain_without_pushes_answers_only_in_motion(path, tmp_path):
     old = changed(path, tmp_path, lambda terrain: terrain.pop("break_away"))
     known = load(old).terrain("TF")
     assert 0.0 < known.risk_in_motion(2.6, 3.5) < 1.0

@@ -55,7 +55,7 @@ def skewed(**more):
 # --- what is kept ---------------------------------------------------------------------
 
 
-def test_what_is_written_is_read_again(tmp_path):
+def test_a_written_database_is_read_back(tmp_path):
     database = skewed()
     again = load(saved(tmp_path, to_text(database)))
     assert again.made_utc == UTC
@@ -92,7 +92,7 @@ def test_factors_and_incline_are_kept_and_bounded(tmp_path):
 
 
 @pytest.mark.parametrize("version", [1, 2, 3, "0.9", None, [1.0] * 99])
-def test_a_file_of_another_version_is_refused_by_its_version(tmp_path, version):
+def test_a_file_of_another_version_is_refused_by_version(tmp_path, version):
     with pytest.raises(SettingsError) as refused:
         load(saved(tmp_path, changed(version=version)))
     shown = f"version: it is {version!r:.20}, and only 1.0 is read."
@@ -108,7 +108,7 @@ def test_a_skewed_force_keeps_its_skew():
     assert answer.mean == pytest.approx(np.exp(0.08), rel=0.03)
 
 
-def test_risk_and_quantile_are_each_others_inverse():
+def test_risk_and_quantile_are_inverse():
     terrain = skewed().terrain("S0")
     answer = terrain.predict(3.0, 0.1)
     for share in (0.005, 0.02, 0.3, 0.8, 0.995):
@@ -166,7 +166,7 @@ def load_other_grid():
     return KnownTerrain("TF", "flat", 1, 1, 0.0, {}, {"m": table}, {}, "m")
 
 
-def test_a_file_too_large_to_be_read_is_not_written():
+def test_a_file_too_large_to_read_is_not_written():
     with pytest.raises(SettingsError, match="6 MB"):
         to_text(skewed(factors={"remarks": "x" * 6_000_000}))
 
@@ -231,7 +231,7 @@ def broken(content):
     return list(problems(content, schema, schema))
 
 
-def test_what_is_written_follows_the_schema_that_is_shipped():
+def test_written_files_follow_the_shipped_schema():
     terrain = replace(
         skewed().terrain("S0"),
         roughness={50: -1.5},

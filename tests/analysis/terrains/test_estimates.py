@@ -13,7 +13,7 @@ TERRAIN = KnownTerrain("S0", "small", 1, 9, 0.0, {}, {"m": TABLE}, {}, "m")
 
 
 @pytest.mark.parametrize("point", [(math.nan, 0.1), (2.0, math.inf)])
-def test_a_value_that_is_no_finite_number_is_refused(point):
+def test_a_value_that_is_not_finite_is_refused(point):
     with pytest.raises(SettingsError, match="finite"):
         TERRAIN.predict(*point)
     with pytest.raises(SettingsError, match="finite"):
@@ -26,14 +26,14 @@ def test_a_value_that_is_no_finite_number_is_refused(point):
     ("point", "is_outside"),
     [((2.0, 0.1), False), ((5.0, 0.2), False), ((6.0, 0.1), True), ((2.0, 0.3), True)],
 )
-def test_an_estimate_says_whether_it_lies_outside_the_table(point, is_outside):
+def test_an_estimate_states_whether_it_is_extrapolated(point, is_outside):
     assert TERRAIN.predict(*point).is_extrapolated is is_outside
 
 
 POINTS = np.array([(2.0, 0.1), (5.0, 0.2), (6.0, 0.1), (0.5, 0.1), (2.0, 0.3)])
 
 
-def test_many_estimates_say_which_of_them_lie_outside_the_table():
+def test_estimates_state_which_of_them_are_extrapolated():
     many = TERRAIN.predict(*POINTS.T)
     single = [TERRAIN.predict(*point).is_extrapolated for point in POINTS.tolist()]
     assert many.is_extrapolated.tolist() == single == [False, False, True, True, True]
@@ -49,7 +49,7 @@ def test_many_estimates_say_which_of_them_lie_outside_the_table():
         ((2.0, 0.3), True),
     ],
 )
-def test_a_risk_says_whether_it_lies_outside_the_table(point, is_outside):
+def test_a_risk_states_whether_it_is_extrapolated(point, is_outside):
     risk = TERRAIN.risk_in_motion(1.0, *point)
     assert risk.is_extrapolated is is_outside
     assert risk.kind == "in motion"

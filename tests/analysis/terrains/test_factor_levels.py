@@ -32,5 +32,5 @@ def study_of(**factors):
         ({"A": {"moisture": "dry"}, "B": {}}, {}),
     ],
 )
-def test_a_level_is_a_word_that_every_terrain_states_and_that_varies(factors, levels):
+def test_a_factor_is_stated_by_every_terrain_and_varies(factors, levels):
     assert words_of(study_of(**factors)) == levels

@@ -86,7 +86,7 @@ def around_nothing(trial, sd=2.0):
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.6, 0.95])
-def test_the_correlation_of_neighbours_is_found(rho):
+def test_the_correlation_of_neighbours_is_recovered(rho):
     trial = first_order(rho)
     found = neighbour_correlation([(trial, around_nothing(trial))])
     assert found == pytest.approx(rho, abs=0.04)
@@ -111,7 +111,7 @@ def test_densities_are_those_of_the_process():
     assert found[:2] == pytest.approx([expected, second])
 
 
-def test_one_spike_does_not_decide():
+def test_a_single_spike_does_not_decide():
     trial = first_order(0.0, count=200)
     calm = log_densities(trial, around_nothing(trial), 0.0)
     F_t = trial.F_t.copy()
@@ -123,20 +123,20 @@ def test_one_spike_does_not_decide():
 # --- a study --------------------------------------------------------------------------
 
 
-def test_terrains_that_differ_are_told_apart_by_their_density(found):
+def test_different_terrains_are_distinguished_by_density(found):
     for levels in found.by_density.values():
         assert levels["terrain"].accuracy > 0.9
         assert levels["surface"].accuracy > 0.9
         assert levels["surface"].counts.sum() == levels["terrain"].counts.sum()
 
 
-def test_the_paper_s_rule_stands_beside_the_density(found):
+def test_the_papers_rule_is_reported_with_the_density(found):
     for levels in found.by_error.values():
         assert set(levels) == {"terrain", "stones", "surface"}
         assert levels["terrain"].accuracy > 0.9
 
 
-def test_many_half_convinced_models_of_one_kind_outvote_a_single_one():
+def test_probabilities_of_one_kind_add_up_over_its_models():
     density = np.zeros((10, 3))
     density[:, 2] = 0.05  # the plate is a little likelier than either bed
     scores = TerrainScores(
@@ -178,7 +178,7 @@ def test_a_posterior_is_a_probability(study):
     assert scores.terrains[int(posterior.argmax())] == "TF"
 
 
-def test_recorded_stones_and_not_names_decide_what_a_terrain_counts_as():
+def test_recorded_stones_decide_the_kind_of_a_terrain():
     # a plate called Sand, small stones called Beach and Gravel
     laws = {"Sand": ("TF", "none"), "Beach": ("S0", "small"), "Gravel": ("S0", "small")}
     trials = {
@@ -208,7 +208,7 @@ def test_recorded_stones_and_not_names_decide_what_a_terrain_counts_as():
 @pytest.mark.shared_data
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-def test_unknown_ground_is_refused_and_known_ground_seldom(shared_data):
+def test_unknown_ground_is_rejected_and_known_ground_rarely(shared_data):
     trials = load_tables([shared_data / "rehearsal_trials.npz"])
     fit = FitOptions(models=(GP_SE,), draws=0)
     study = run_study(trials, StudyOptions(fit=fit), simulated=True)
@@ -231,7 +231,7 @@ def test_the_database_answers_as_the_models_do(study, path):
     assert answer.quantile(0.05) < answer.mean < answer.quantile(0.95)
 
 
-def test_the_database_samples_paths_by_the_correlation_of_trials_left_out(path):
+def test_the_database_samples_paths_with_held_out_correlation(path):
     for name in LEVELS:
         known = load(path).terrain(name)
         # 0.98 from one recorded sample to the next, 2 ms, with the level of a trial
@@ -251,7 +251,7 @@ def test_one_point_and_many_points_agree(path):
     assert many.sd == pytest.approx([a.sd for a in single], abs=1e-9)
 
 
-def test_more_traction_than_there_is_is_a_risk(path):
+def test_excess_traction_demand_is_a_risk(path):
     known = load(path).terrain("TF")
     median = known.predict(3.5, 0.005).median
     assert known.risk_in_motion(0.5 * median, 3.5) < 0.01
@@ -259,7 +259,7 @@ def test_more_traction_than_there_is_is_a_risk(path):
     assert known.risk_in_motion(1.5 * median, 3.5) > 0.99
 
 
-def test_the_tables_are_close_to_the_model_between_their_points(study, path):
+def test_interpolated_tables_are_close_to_the_model(study, path):
     trials = tuple(SampleTable.of([t]) for t in study.terrains["S0"].trials)
     no_axes = (np.zeros(0), np.zeros(0))
     training = training_set(TableTask("S0", trials, no_axes, study.options.fit))
@@ -298,7 +298,7 @@ def test_an_unknown_terrain_and_an_unknown_model_are_named(path):
         ({"terrains": 3}, "not a terrain database: terrains: "),
     ],
 )
-def test_a_file_that_is_no_database_is_refused(path, tmp_path, change, said):
+def test_a_file_that_is_not_a_database_is_refused(path, tmp_path, change, said):
     content = json.loads(path.read_text()) | change
     bad = tmp_path / "bad.json"
     bad.write_text(json.dumps(content))
@@ -320,7 +320,7 @@ def test_a_missing_file_is_named(tmp_path):
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False), st.floats(-1e9, 1e9))
-def test_no_point_is_too_far_away_for_an_answer(F_n, v_t):
+def test_a_distant_point_still_has_an_answer(F_n, v_t):
     rows = ((1.0, 2.0), (3.0, 4.0))
     table = Table((0.0, 10.0), (0.005, 0.2), (0.1, 0.9), (rows, rows))
     low, high = table.at(F_n, v_t)
@@ -335,7 +335,7 @@ def kept(series):
     return prepare_trial(series, PrepareOptions())
 
 
-def test_a_trial_that_was_never_seen_is_recognised(path):
+def test_a_held_out_trial_is_recognised(path):
     database = load(path)
     for name in LEVELS:
         seen = recognise(kept(push(name, 77)), database)
@@ -344,7 +344,7 @@ def test_a_trial_that_was_never_seen_is_recognised(path):
         assert seen.least_error == name
 
 
-def test_probabilities_come_over_time(path):
+def test_probabilities_are_given_over_time(path):
     seen = recognise(kept(push("TF", 78)), load(path), window=50)
     times = [moment.t for moment in seen.moments]
     assert times == sorted(times)
@@ -352,12 +352,12 @@ def test_probabilities_come_over_time(path):
     assert all(sum(m.posterior) == pytest.approx(1.0) for m in seen.moments)
 
 
-def test_ground_that_nobody_knows_is_none_of_the_known(path):
+def test_unknown_ground_matches_no_known_terrain(path):
     seen = recognise(kept(push("moon", 1, ratio=4.0, spread=0.1)), load(path))
     assert seen.best == "none"
 
 
-def test_the_surface_of_a_trial_that_was_never_seen_is_told(path):
+def test_the_surface_of_a_held_out_trial_is_classified(path):
     database = load(path)
     for name, surface in (("S0", "rocky"), ("TF", "flat"), ("Tf", "flat")):
         seen = recognise(kept(push(name, 79)), database)
@@ -365,7 +365,7 @@ def test_the_surface_of_a_trial_that_was_never_seen_is_told(path):
         assert all((m.rocky > 0.5) == (surface == "rocky") for m in seen.moments)
 
 
-def test_a_database_without_a_classifier_tells_surfaces_by_its_models(path, tmp_path):
+def test_without_a_classifier_surfaces_are_classified_by_the_models(path, tmp_path):
     content = json.loads(path.read_text())
     del content["surfaces"]
     old = tmp_path / "old.json"
@@ -375,7 +375,7 @@ def test_a_database_without_a_classifier_tells_surfaces_by_its_models(path, tmp_
     assert {moment.rocky for moment in seen.moments} == {None}
 
 
-def test_a_plate_is_none_of_the_stones(path, tmp_path):
+def test_a_plate_is_not_classified_as_stones(path, tmp_path):
     content = json.loads(path.read_text())
     content["terrains"] = {"S0": content["terrains"]["S0"]}
     stones = tmp_path / "stones.json"
@@ -409,7 +409,7 @@ def test_stones_of_one_kind_are_a_family(study, found):
     assert found.rocky == ("S0",)
 
 
-def test_features_tell_flat_from_rocky_with_honest_probabilities(found):
+def test_features_separate_flat_from_rocky_with_calibrated_probabilities(found):
     for size, levels in found.by_features.items():
         assert levels["surface"].accuracy > 0.95
         assert found.calibrations[size].error < 0.06

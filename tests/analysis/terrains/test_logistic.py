@@ -20,7 +20,7 @@ def fitted():
     return fit_logistic(X, truth, np.ones(truth.size))
 
 
-def test_the_fit_is_that_of_an_independent_library():
+def test_the_fit_agrees_with_an_independent_library():
     from sklearn.linear_model import LogisticRegression
 
     X, truth = rows()
@@ -33,7 +33,7 @@ def test_the_fit_is_that_of_an_independent_library():
     assert own[0] == pytest.approx(other.intercept_[0], abs=1e-4)
 
 
-def test_rows_that_count_twice_are_rows_that_are_there_twice():
+def test_a_weight_of_two_equals_a_repeated_row():
     X, truth = rows(200)
     weighted = fit_logistic(X, truth, np.full(200, 2.0))
     doubled = fit_logistic(np.tile(X, (2, 1)), np.tile(truth, 2), np.ones(400))
@@ -47,13 +47,13 @@ def test_separable_rows_end_with_finite_weights():
     assert model.probabilities(np.array([[1.0]]))[0] > 0.95
 
 
-def test_one_answer_teaches_nothing():
+def test_a_single_class_gives_an_uninformative_fit():
     X, _ = rows(50)
     with pytest.raises(ValueError, match="one answer"):
         fit_logistic(X, np.zeros(50, bool), np.ones(50))
 
 
-def test_a_model_survives_its_text_bit_for_bit():
+def test_a_model_round_trips_through_text_bit_for_bit():
     model = fitted()
     text = json.dumps(asdict(model))
     assert RidgeLogistic.from_dict(json.loads(text), 3) == model
@@ -68,7 +68,7 @@ def test_a_model_survives_its_text_bit_for_bit():
         ({"scale": [1.0, 0.0, 1.0]}, "scale.1: Input should be greater than"),
     ],
 )
-def test_a_model_that_cannot_be_is_refused(change, words):
+def test_an_invalid_model_is_refused(change, words):
     with pytest.raises(ValueError, match=r".+") as caught:
         RidgeLogistic.from_dict(asdict(fitted()) | change, 3)
     assert first_problem(caught.value).startswith(words)

@@ -36,7 +36,7 @@ def drawn(copula, trials, rows, seed=1):
     ]
 
 
-def test_a_copula_is_recovered_from_its_own_scores():
+def test_a_copula_is_recovered_from_its_scores():
     fitted = fit_copula(drawn(TRUE, 400, 800))
     assert fitted.level == pytest.approx(TRUE.level, abs=0.04)
     assert fitted.tau_stick == pytest.approx(TRUE.tau_stick, rel=0.1)
@@ -68,7 +68,7 @@ def test_halving_the_step_changes_no_correlation():
     )
 
 
-def test_one_trial_shows_no_copula():
+def test_one_trial_gives_no_copula():
     assert fit_copula(drawn(TRUE, 1, 800)) is None
     assert fit_copula([]) is None
 
@@ -84,7 +84,7 @@ def test_sampled_forces_have_the_quantiles_of_a_new_trial(name):
         assert np.abs(np.subtract(shares, SHARES)).max() < 0.012
 
 
-def test_a_seed_gives_the_same_path_and_a_generator_goes_on():
+def test_a_seed_is_reproducible_and_a_generator_advances():
     known, path = database().terrain("S0"), (np.linspace(2.0, 6.0, 50), 0.05, DT)
     assert np.array_equal(known.sample(*path, seed=5), known.sample(*path, seed=5))
     rng = np.random.default_rng(5)
@@ -93,14 +93,14 @@ def test_a_seed_gives_the_same_path_and_a_generator_goes_on():
     assert not np.array_equal(first, second)
 
 
-def test_a_path_outside_the_table_is_that_of_its_edge():
+def test_a_path_outside_the_table_is_clamped_to_its_edge():
     known = database().terrain("S0")
     F_n, v_t = known.tables["gp_se_trial"].F_n[-1], known.tables["gp_se_trial"].v_t[-1]
     edge = known.sample([F_n] * 40, v_t, DT, seed=6)
     assert np.array_equal(known.sample([9.0 * F_n] * 40, 9.0 * v_t, DT, seed=6), edge)
 
 
-def test_no_force_has_a_sign_that_no_quantile_has():
+def test_sampled_forces_have_a_sign_of_their_quantiles():
     scores = np.array([[-9.0], [9.0]])
     forces = np.exp(normal_scores(SHARES))[
         :, None
@@ -133,7 +133,7 @@ def test_no_force_has_a_sign_that_no_quantile_has():
         ({"v_t": [0.1, 0.1, 0.1]}, "one shape"),
     ],
 )
-def test_what_is_no_path_is_refused(change, word):
+def test_an_invalid_path_is_refused(change, word):
     sound = {"F_n": [1.0, 2.0], "v_t": [0.05, 0.06], "dt": DT, "seed": 1, "count": 2}
     known = database().terrain("S0")
     assert known.sample(**sound).shape == (2, 2)
@@ -141,7 +141,7 @@ def test_what_is_no_path_is_refused(change, word):
         known.sample(**sound | change)
 
 
-def test_a_terrain_without_a_copula_refuses():
+def test_a_terrain_without_a_copula_refuses_sampling():
     known = replace(database().terrain("S0"), copula=None)
     with pytest.raises(SettingsError, match="not known"):
         known.sample([3.0], [0.05], DT, seed=1)

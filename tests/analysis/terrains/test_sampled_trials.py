@@ -10,7 +10,7 @@ BEST_OF_INDEPENDENT = 0.98
 NEARLY = 0.1  # of a correlation
 
 
-def test_energy_score_of_one_row_is_the_ranked_probability_score():
+def test_the_energy_score_of_one_row_is_the_crps():
     draws = np.random.default_rng(1).standard_normal((4000, 1))
     # of a standard normal at 0: 2 phi(0) - 1 / sqrt(pi)
     expected = 2.0 / np.sqrt(2.0 * np.pi) - 1.0 / np.sqrt(np.pi)
@@ -20,7 +20,7 @@ def test_energy_score_of_one_row_is_the_ranked_probability_score():
 @pytest.mark.shared_data
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-def test_drawn_trials_resemble_recorded_ones_that_were_left_out(shared_data):
+def test_sampled_trials_resemble_held_out_recordings(shared_data):
     tables = tr.load_tables(shared_data / "rehearsal_trials.npz")
     trials = [trial for name in ("S10", "B0", "TF") for trial in tables.on(name)]
     for found in compare_samples(trials):

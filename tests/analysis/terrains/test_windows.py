@@ -50,7 +50,7 @@ def record(rough=0.3, seed=0, rows=4000):
     return prepare_trial(series, PrepareOptions(smoothing=1))
 
 
-def test_windows_follow_each_other_or_overlap_by_four_fifths():
+def test_windows_are_contiguous_or_overlap_as_configured():
     assert [w.start for w in windows_of(230, 100)] == [0, 100]
     overlapping = windows_of(230, 100, overlap=True)
     assert [w.start for w in overlapping] == [0, 20, 40, 60, 80, 100, 120]
@@ -58,7 +58,7 @@ def test_windows_follow_each_other_or_overlap_by_four_fifths():
     assert windows_of(99, 100) == []
 
 
-def test_a_stretch_holds_the_pauses_between_its_kept_samples():
+def test_a_window_spans_the_pauses_between_its_kept_samples():
     trial = record()
     stretch = stretch_of(trial, slice(0, 200))
     assert stretch.is_kept.sum() == 200
@@ -77,7 +77,7 @@ def test_roughness_is_the_spread_about_a_line_in_the_load():
     assert features[FEATURES.index("slope of F_t on F_n")] == pytest.approx(line[0])
 
 
-def test_features_look_at_their_stretch_and_nothing_after_it():
+def test_features_use_their_window_and_no_later_sample():
     trial = record()
     windows = windows_of(trial.kept, 100)[:2]
     last = trial.indices[windows[-1]][-1] + 1
@@ -114,7 +114,7 @@ def fitted(X, is_rocky):
     return fit_balanced([(X[is_rocky], True), (X[~is_rocky], False)], 0.2)
 
 
-def test_probabilities_are_those_of_the_kinds_that_made_the_windows():
+def test_probabilities_match_the_generating_kinds():
     model = fitted(*drawn())
     X, is_rocky = drawn(seed=1)
     exact = 1.0 / (1.0 + np.exp(-2.0 * 0.7 * X[:, :2].sum(axis=1)))
@@ -123,7 +123,7 @@ def test_probabilities_are_those_of_the_kinds_that_made_the_windows():
     assert ((found > 0.5) == is_rocky).mean() == pytest.approx(0.84, abs=0.02)
 
 
-def test_the_fit_is_that_of_an_independent_program():
+def test_the_fit_agrees_with_an_independent_program():
     from sklearn.linear_model import LogisticRegression
 
     X, is_rocky = drawn(count=500, shift=0.4)
@@ -138,7 +138,7 @@ def test_the_fit_is_that_of_an_independent_program():
     assert model.weights[0] == pytest.approx(other.intercept_[0], abs=1e-4)
 
 
-def test_kinds_that_never_overlap_have_finite_weights():
+def test_separable_kinds_have_finite_weights():
     X = np.linspace(-1.0, 1.0, 200)[:, None] * np.ones(len(FEATURES))
     model = fitted(1e6 * X, X[:, 0] > 0.0)
     assert np.isfinite(model.weights).all()
@@ -167,7 +167,7 @@ def classifier():
 
 @pytest.mark.parametrize("size", WINDOWS)
 @pytest.mark.parametrize(("rough", "is_rocky"), [(0.6, True), (0.1, False)])
-def test_windows_of_new_trials_are_told_apart(classifier, size, rough, is_rocky):
+def test_windows_of_new_trials_are_classified(classifier, size, rough, is_rocky):
     trial = record(rough, seed=50)
     features = window_features(trial, windows_of(trial.kept, size))
     rocky = classifier.models[size].probabilities(features)
@@ -180,7 +180,7 @@ def test_with_one_kind_of_ground_there_is_no_classifier():
     assert fit_surfaces(other) is None
 
 
-def test_a_stored_classifier_answers_alike(classifier):
+def test_a_stored_classifier_gives_the_same_answers(classifier):
     stored = SurfaceClassifier.from_dict(json.loads(json.dumps(classifier.to_dict())))
     X, _ = drawn(count=50)
     for size, model in classifier.models.items():
@@ -215,7 +215,7 @@ def said(rocky, surface, count):
     return [SurfaceProbability("S0", surface, rocky)] * count
 
 
-def test_probabilities_that_hold_have_no_calibration_error():
+def test_calibrated_probabilities_have_no_calibration_error():
     honest = [
         *said(0.8, ROCKY_GROUND, 80),
         *said(0.8, FLAT_GROUND, 20),
@@ -257,7 +257,7 @@ def study_evidence():
 
 
 @pytest.mark.parametrize("size", [50, 100])
-def test_ground_of_the_kind_that_is_not_known_is_excluded(study_evidence, size):
+def test_ground_of_unknown_kind_is_excluded(study_evidence, size):
     result = exclusion_of(study_evidence, size)
     # a plate fits the wide bands of stones: only its smoothness shows it
     assert result.flat_among_rocky > 0.95
@@ -265,7 +265,7 @@ def test_ground_of_the_kind_that_is_not_known_is_excluded(study_evidence, size):
     assert result.false_alarms < 0.2  # by limits of three short trials
 
 
-def test_windows_held_out_are_classified_by_trials_of_other_numbers(study_evidence):
+def test_held_out_windows_are_classified_by_other_trial_numbers(study_evidence):
     found = surface_probabilities(study_evidence, 100)
     windows = sum(
         len(trial.features[100])
@@ -276,7 +276,7 @@ def test_windows_held_out_are_classified_by_trials_of_other_numbers(study_eviden
     assert all(p.answer == p.surface for p in found)
 
 
-def test_limits_leave_out_the_trial_that_is_judged(study_evidence):
+def test_limits_exclude_the_judged_trial(study_evidence):
     strange = evidence(0.01, 9, (0.0, -1.0))
     more = StudyEvidence(
         {**study_evidence.trials, "S0": [*study_evidence.trials["S0"], strange]},
@@ -310,7 +310,7 @@ def made_up(name, number, rng):
 
 @pytest.mark.parametrize("surface", [ROCKY_GROUND, FLAT_GROUND])
 @pytest.mark.parametrize("trials", [10, 40])
-def test_as_many_windows_of_trials_left_out_are_refused_as_allowed(surface, trials):
+def test_the_rejection_rate_of_held_out_windows_is_as_allowed(surface, trials):
     shares = []
     for seed in range(8):
         rng = np.random.default_rng(seed)
@@ -320,7 +320,7 @@ def test_as_many_windows_of_trials_left_out_are_refused_as_allowed(surface, tria
     assert np.mean(shares) == pytest.approx(REFUSED, abs=0.02)
 
 
-def test_a_single_trial_refuses_some_of_its_own_windows():
+def test_a_single_trial_rejects_some_of_its_own_windows():
     rng = np.random.default_rng(3)
     trial = made_up("S0", 0, rng)
     limits = StudyEvidence({"S0": [trial]}, {"S0": FLAT_GROUND}).limits("S0", 50)
@@ -330,7 +330,7 @@ def test_a_single_trial_refuses_some_of_its_own_windows():
     assert 0.0 < np.mean(refused) <= REFUSED + 2 / len(refused)  # two limits, rounded
 
 
-def test_trials_beyond_the_number_of_the_other_kind_s_are_left_out(study_evidence):
+def test_surplus_trials_of_the_larger_kind_are_left_out(study_evidence):
     alone = evidence(0.1, 9, (0.0,), terrains=("TF",))
     more = StudyEvidence(
         {**study_evidence.trials, "TF": [*study_evidence.trials["TF"], alone]},
@@ -346,8 +346,6 @@ def test_trials_beyond_the_number_of_the_other_kind_s_are_left_out(study_evidenc
     ("roughness", "strain", "is_out"),
     [(-1.0, 1.0, False), (-2.1, 1.0, True), (-1.0, 3.1, True), (5.0, 0.0, False)],
 )
-def test_a_window_is_out_where_it_is_too_smooth_or_strains_too_much(
-    roughness, strain, is_out
-):
+def test_a_window_too_smooth_or_too_strained_is_rejected(roughness, strain, is_out):
     assert WindowLimits(-2.0, 3.0).exclude(roughness, strain) is is_out
     assert not WindowLimits().exclude(roughness, strain)

@@ -64,7 +64,7 @@ def test_signs_of_the_papers_rows_are_taken_literally():
     assert found[0] == pytest.approx(0.71 * 3 * (1 - e) + 13.52 * e - 23.4 * 0.05)
 
 
-def test_a_step_of_exponent_420_does_not_overflow():
+def test_a_very_steep_exponent_does_not_overflow():
     row = TustinParameters(mu=0.843, F_s=0.534, v_s=0.079, delta_s=420.0, b=7.49)
     found = predict(row, np.array([1.0, 1.0]), np.array([0.07, 0.2]))
     np.testing.assert_allclose(found, [0.534 + 7.49 * 0.07, 0.843 + 7.49 * 0.2])
@@ -86,7 +86,9 @@ def test_linear_parameters_and_error_at_a_given_shape(vectors, samples):
 
 @pytest.mark.parametrize("is_proportional", [False, True])
 @pytest.mark.parametrize("b_upper", [200.0, 3.0])
-def test_slope_of_the_search_agrees_with_differences(samples, b_upper, is_proportional):
+def test_gradient_of_the_search_agrees_with_differences(
+    samples, b_upper, is_proportional
+):
     box = TustinBounds(b=(-200.0, b_upper)).box()
     weights = np.linspace(0.5, 2.0, samples[0].size)
     problem = Problem(samples, box, is_proportional=is_proportional, weights=weights)
@@ -144,7 +146,7 @@ def test_no_start_of_an_independent_solver_does_better(stones):
     assert ours <= best * (1 + 1e-6)
 
 
-def test_no_step_at_another_velocity_does_better():
+def test_no_other_step_velocity_does_better():
     rng = np.random.default_rng(119)
     F_n, v = rng.uniform(2, 10, 60), np.exp(rng.uniform(-5.3, -1.6, 60))
     step = TustinParameters(mu=0.6, F_s=9.0, v_s=0.04, delta_s=20.0, b=6.0)
@@ -156,7 +158,7 @@ def test_no_step_at_another_velocity_does_better():
     assert fit_tustin(F_n, v, F_t).sse <= best
 
 
-def test_flags_say_that_a_parameter_lies_on_its_bound(stones):
+def test_a_parameter_on_its_bound_is_flagged(stones):
     box = TustinBounds(v_s=(0.05, 1.0))
     fit = fit_tustin(stones.F_n, stones.v_t, stones.F_t, box)
     assert fit.parameters.v_s == pytest.approx(0.05)
@@ -187,7 +189,7 @@ def test_static_friction_can_be_proportional_to_load():
 
 
 @pytest.mark.parametrize("loss", ["huber", "student"])
-def test_wild_samples_do_not_pull_a_robust_fit(loss):
+def test_outliers_do_not_bias_a_robust_fit(loss):
     rng = np.random.default_rng(9)
     F_n, v = rng.uniform(2, 10, 600), rng.uniform(0.005, 0.2, 600)
     clean = predict(PLAIN, F_n, v)
@@ -210,7 +212,7 @@ def test_a_force_that_falls_with_load_is_flagged_as_nonphysical():
     assert "b negative" not in flags
 
 
-def test_profile_holds_the_truth_and_closes_on_a_clear_curve():
+def test_a_profile_of_a_clear_curve_closes_and_contains_the_truth():
     rng = np.random.default_rng(12)
     F_n, v = rng.uniform(2, 10, 3000), np.exp(rng.uniform(-5.3, -1.6, 3000))
     fit = fit_tustin(F_n, v, predict(PLAIN, F_n, v) + rng.normal(0, 0.2, 3000))
@@ -221,7 +223,7 @@ def test_profile_holds_the_truth_and_closes_on_a_clear_curve():
     assert NOT_IDENTIFIABLE not in fit.flags
 
 
-def test_profile_of_a_straight_line_stays_open():
+def test_a_profile_of_a_straight_line_stays_open():
     rng = np.random.default_rng(13)
     F_n, v = rng.uniform(2, 10, 600), rng.uniform(0.005, 0.2, 600)
     fit = fit_tustin(F_n, v, 0.5 * F_n + 1.0 + 5.0 * v + rng.normal(0, 0.3, 600))
@@ -239,7 +241,7 @@ def test_binned_sums_give_the_error_of_the_samples(stones):
     np.testing.assert_allclose(sse, exact, rtol=1e-3)
 
 
-def test_ever_smaller_steps_lead_to_the_bottom_of_a_bowl():
+def test_the_search_converges_in_a_convex_bowl():
     bottoms = np.array([[-4.0, 0.7], [-5.1, 1.3]])
     box = np.array([[-7.0, 0.0], [-2.0, 3.0]])
 
@@ -254,7 +256,7 @@ def test_ever_smaller_steps_lead_to_the_bottom_of_a_bowl():
     assert outside[:, 0].max() <= -3.0
 
 
-def test_a_start_just_above_a_known_optimum_is_left_there(stones):
+def test_a_start_near_a_known_optimum_is_abandoned(stones):
     problem = Problem((stones.F_n, stones.v_t, stones.F_t), TustinBounds().box())
     best = search(problem, Moments.of(problem, (stones.count,)))[0]
     start = np.add(best.q, 0.3)
@@ -263,7 +265,7 @@ def test_a_start_just_above_a_known_optimum_is_left_there(stones):
     assert best.sse * (1 + 1e-9) < left.sse <= best.sse * 1.001
 
 
-def test_bootstrap_draws_whole_trials_and_holds_the_truth():
+def test_the_bootstrap_resamples_trials_and_contains_the_truth():
     rng = np.random.default_rng(14)
     trials = []
     for shift in rng.normal(0, 0.3, 10):  # what a trial has in common
@@ -313,7 +315,7 @@ def test_too_few_samples_are_refused():
 
 
 @pytest.mark.parametrize("choice", [{"mu": (1.0, 1.0)}, {"v_s": (0.0, 1.0)}])
-def test_bounds_that_are_no_range_are_refused(choice):
+def test_invalid_bounds_are_refused(choice):
     with pytest.raises(SettingsError, match="are no range"):
         TustinBounds(**choice)
 
@@ -323,7 +325,7 @@ def test_bounds_that_are_no_range_are_refused(choice):
     arrays(np.float64, (8, 3), elements=TENTHS),
     arrays(np.float64, 8, elements=TENTHS),
 )
-def test_box_solution_is_never_worse_than_scipys(A, y):
+def test_the_box_solution_is_never_worse_than_scipys(A, y):
     from scipy.optimize import lsq_linear
 
     lower, upper = np.array([0.0, -1.0, -0.5]), np.array([1.0, 2.0, 0.5])

@@ -49,14 +49,14 @@ def asleep(nodes):
 
 
 @pytest.mark.parametrize("has_sensor", [False, True])
-def test_enumeration_finds_the_devices_that_are_there_and_no_others(arm, has_sensor):
+def test_enumeration_finds_exactly_the_present_devices(arm, has_sensor):
     sleeping = arm(are_asleep=True, is_zeroed=False, has_sensor=has_sensor)
     found = {node: say(sleeping, node, b"\x05") for node in range(1, 32)}
     expected = asleep(range(1, 9 if has_sensor else 8)) | SAFETY
     assert {n: heard for n, heard in found.items() if heard} == expected
 
 
-def test_a_woken_puck_tells_its_own_firmware(arm, vers):
+def test_a_woken_puck_reports_its_own_firmware(arm, vers):
     sleeping = arm(are_asleep=True, is_zeroed=False, boot_ns=20 * MS)
     assert say(sleeping, 7, encode_set(5, 2), 30 * MS) == []
     assert say(sleeping, 7, b"\x05") == [(0x4E6, "85 00 02 00")]
@@ -74,7 +74,7 @@ def test_a_tare_is_not_answered(arm):
     assert say(arm(has_sensor=True), 8, b"\xb6\0\0\0\0\0") == []
 
 
-def test_a_get_has_one_answer_and_a_set_none(arm, vers):
+def test_a_get_has_one_reply_and_a_set_none(arm, vers):
     one = arm()
     number = property_number(Device.MOTOR, "MT", vers)
     assert say(one, 3, encode_set(number, 1234)) == []
@@ -97,7 +97,7 @@ def test_the_arm_reports_its_positions_in_node_order_and_then_the_wrench(
     assert [i for i, _ in heard if i < 0x500] == [0x403 + 0x20 * n for n in range(1, 8)]
 
 
-def test_torque_frames_move_an_active_arm_without_an_answer(arm, vers):
+def test_torque_frames_move_an_active_arm_without_a_reply(arm, vers):
     one = arm()
     number = property_number(Device.MOTOR, "T", vers)
     one.press("activate")
@@ -114,7 +114,7 @@ def test_torque_frames_leave_an_idle_arm_alone(arm):
     assert one.motors.units == [0] * 7
 
 
-def test_an_arm_in_e_stop_leaves_only_the_safety_module_on_the_bus(arm):
+def test_in_e_stop_only_the_safety_module_is_on_the_bus(arm):
     one = arm(has_sensor=True)
     one.press("estop")
     say(one, 1, b"\x05")  # fetches the broadcast as well
@@ -122,7 +122,7 @@ def test_an_arm_in_e_stop_leaves_only_the_safety_module_on_the_bus(arm):
     assert say(one, 10, b"\x08") == [(0x546, "88 00 00 00")]
 
 
-def test_power_brings_pucks_and_sensor_back_asleep(arm):
+def test_power_returns_pucks_and_sensor_asleep(arm):
     one = arm(has_sensor=True)
     one.press("estop")
     one.press("idle")

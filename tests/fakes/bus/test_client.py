@@ -61,18 +61,18 @@ def intruder(hub, path):
         yield plain
 
 
-def test_a_packet_is_a_can_frame_of_linux():
+def test_a_packet_has_the_linux_can_frame_layout():
     known = bytes.fromhex("26040000 04 000000 8500020000000000")
     assert pack_frame(0x426, bytes.fromhex("85000200")) == known
 
 
 @given(st.integers(0, 0x7FF), st.binary(max_size=8))
-def test_a_frame_survives_the_packet(can_id, data):
+def test_a_frame_round_trips_through_a_packet(can_id, data):
     assert unpack_frame(pack_frame(can_id, data)) == (can_id, data)
 
 
 @given(st.binary(max_size=40))
-def test_no_packet_makes_a_frame_that_no_bus_carries(packet):
+def test_no_packet_decodes_to_an_impossible_frame(packet):
     frame = unpack_frame(packet)
     assert frame is None or (frame[0] <= 0x7FF and len(frame[1]) <= 8)
 
@@ -89,7 +89,7 @@ def test_no_packet_makes_a_frame_that_no_bus_carries(packet):
         QUESTION[:4] + b"\x09" + QUESTION[5:],
     ],
 )
-def test_the_hub_ignores_and_counts_what_is_no_classic_frame(hub, intruder, packet):
+def test_the_hub_ignores_and_counts_other_frames(hub, intruder, packet):
     intruder.send(packet)
     intruder.send(QUESTION)
     assert hub.receive() == [(0x404, b"\x30")]
@@ -110,14 +110,14 @@ def test_a_frame_of_the_network_reaches_every_client(hub, join):
     assert [bus.recv(0).arbitration_id for bus in clients] == [0x426, 0x426]
 
 
-def test_the_hub_is_readable_when_somebody_sends(hub, join):
+def test_the_hub_is_readable_when_a_client_sends(hub, join):
     bus = join()
     assert not hub.is_readable()
     bus.send(message(1))
     assert hub.is_readable()
 
 
-def test_a_client_that_never_reads_loses_frames_and_stops_nobody(hub, join):
+def test_a_client_that_never_reads_only_loses_its_own_frames(hub, join):
     join()
     while hub.lost == 0:
         hub.send(0x426, b"\x85\x00\x02\x00")
@@ -135,7 +135,7 @@ def test_a_client_that_leaves_is_forgotten(hub, join):
     assert not hub.is_readable()
 
 
-def test_too_many_clients_are_sent_away(hub, join):
+def test_too_many_clients_are_refused(hub, join):
     for _ in range(CLIENTS):
         join()
     extra = join()
@@ -174,7 +174,7 @@ def test_filters_of_python_can_are_respected(hub, join):
     assert bus.recv(1.0).arbitration_id == 0x426
 
 
-def test_a_bus_that_has_ended_says_so(hub, join):
+def test_an_ended_bus_is_reported(hub, join):
     bus = join()
     hub.close()
     with pytest.raises(can.CanOperationError, match="has ended"):
@@ -203,7 +203,7 @@ def test_a_bus_has_a_descriptor_until_it_is_shut_down(join):
     assert bus.fileno() == -1
 
 
-def test_where_nobody_serves_no_bus_can_be_opened(path):
+def test_a_bus_without_a_server_cannot_be_opened(path):
     with pytest.raises(can.CanInitializationError, match="no server at"):
         SocketBus(str(path))
 
@@ -214,7 +214,7 @@ def test_python_can_finds_the_bus_by_its_entry_point():
     assert EntryPoint("traction-fake", value, "can.interface").load() is SocketBus
 
 
-def test_the_driver_opens_the_bus_as_any_other(hub, path, monkeypatch):
+def test_the_driver_opens_the_bus_like_any_other(hub, path, monkeypatch):
     backend = ("fakes.bus.client", "SocketBus")
     monkeypatch.setitem(can.interfaces.BACKENDS, "traction-fake", backend)
     monkeypatch.setattr(can.util, "VALID_INTERFACES", {"traction-fake"})
@@ -245,7 +245,7 @@ def test_a_path_in_use_is_refused(hub, path):
     assert path.is_socket()
 
 
-def test_a_socket_left_behind_is_taken_over(path):
+def test_a_stale_socket_is_taken_over(path):
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as dead:
         dead.bind(str(path))
     hub = SocketHub(path)

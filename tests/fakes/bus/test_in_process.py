@@ -50,7 +50,7 @@ def test_the_bus_carries_one_frame_at_a_time(rig):
     assert all(abs(gap - FRAME_NS[3]) <= 2 for gap in gaps)
 
 
-def test_seven_positions_are_there_within_0_7_ms(rig):
+def test_seven_positions_arrive_within_their_time_budget(rig):
     rig.bus.send(message(0x404, b"\x30"))
     rig.rest(700_000)
     assert len(arrivals(rig)) == 7
@@ -74,20 +74,20 @@ def test_own_frames_do_not_come_back(rig):
 
 
 @pytest.mark.parametrize("flag", ["is_extended_id", "is_remote_frame"])
-def test_frames_of_another_kind_reach_nobody(rig, flag):
+def test_frames_of_another_kind_are_not_delivered(rig, flag):
     rig.bus.send(message(1, b"" if flag == "is_remote_frame" else b"\x05", **{flag: 1}))
     rig.rest(1_000_000)
     assert arrivals(rig) == []
 
 
-def test_a_receive_with_a_time_out_lets_simulated_time_pass(rig):
+def test_a_receive_with_a_timeout_advances_simulated_time(rig):
     begin_ns = rig.clock.t_ns
     rig.bus.send(message(1, b"\x05"))
     assert rig.bus.recv(1.0).arbitration_id == 0x426
     assert rig.clock.t_ns - begin_ns < 1_000_000
 
 
-def test_a_time_out_is_as_long_as_asked_on_the_clock(rig):
+def test_a_timeout_lasts_as_requested(rig):
     begin_ns = rig.clock.t_ns
     assert rig.bus.recv(0.25) is None
     assert rig.clock.t_ns - begin_ns == 250_000_000
@@ -119,12 +119,12 @@ def test_a_bus_that_was_shut_down_sends_nothing():
         bus.send(message(1, b"\x05"))
 
 
-def test_there_is_no_descriptor(rig):
+def test_an_in_process_bus_has_no_descriptor(rig):
     with pytest.raises(NotImplementedError):
         rig.bus.fileno()
 
 
-def test_frame_times_are_between_no_and_worst_stuffing():
+def test_frame_times_lie_between_no_and_worst_case_stuffing():
     for n, wire_ns in enumerate(FRAME_NS):
         bits = 47 + 8 * n
         assert bits <= wire_ns / 1000 <= bits + (33 + 8 * n) // 4

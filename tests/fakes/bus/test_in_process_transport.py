@@ -139,7 +139,7 @@ def a_bus_that_was_shut_down(ends):
         a_bus_that_was_shut_down,
     ],
 )
-def test_a_transport_without_messages_is_python_cans_transport(happen):
+def test_a_transport_without_raw_frames_falls_back_to_python_can(happen):
     short, long = Ends(InProcessTransport), Ends(PythonCanTransport)
     happen(short)
     happen(long)

@@ -78,7 +78,7 @@ def test_contact_creates_no_energy_over_a_closed_path(stones, foot, path):
 
 @pytest.mark.parametrize(("stones", "foot"), GROUNDS)
 @pytest.mark.parametrize("stretch", [0.0003, 0.0006, 0.002])
-def test_a_light_touch_is_not_paid_back_as_a_heavy_one(stones, foot, stretch):
+def test_a_light_touch_stores_no_energy_for_a_heavy_one(stones, foot, stretch):
     light = (stretch, 0.0, 0.0, 0.0, 0.0, 0.5)
     heavy = (stretch, 0.0, 0.0, 0.0, 0.0, 10.0)
     back = (stretch - 0.0005, 0.0, 0.0, 0.0, 0.0, 10.0)
@@ -88,7 +88,7 @@ def test_a_light_touch_is_not_paid_back_as_a_heavy_one(stones, foot, stretch):
 
 
 @pytest.mark.parametrize(("stones", "foot"), GROUNDS)
-def test_a_foot_that_stands_is_pushed_back_as_hard_as_it_presses(stones, foot):
+def test_a_foot_at_rest_meets_an_equal_reaction(stones, foot):
     ground = make_ground(stones, foot, 1)
     z = ground.surface(0.0) - PRESS / ground.stiffness
     for _ in range(400):

@@ -15,7 +15,7 @@ from fakes.ground.terrain import PLATES, GroundChoice, PlateParameters
 
 
 @pytest.mark.parametrize("name", ["small", "big"])
-def test_the_known_sizes_are_themselves(name):
+def test_known_stone_sizes_keep_their_parameters(name):
     known = STONES[name]
     made = stones_of_size(known.d50)
     for field in fields(StoneParameters):
@@ -24,25 +24,25 @@ def test_the_known_sizes_are_themselves(name):
 
 
 @pytest.mark.parametrize("d50", [0.010, 0.026, 0.060])
-def test_every_size_is_a_bed(d50):
+def test_every_stone_size_gives_a_bed(d50):
     made = stones_of_size(d50)
     assert made.N >= 2
     assert all(getattr(made, field.name) > 0.0 for field in fields(StoneParameters))
 
 
-def test_parameters_lie_between_those_of_the_neighbours():
+def test_parameters_are_interpolated_between_neighbours():
     made = stones_of_size(0.026)
     assert STONES["big"].N < made.N < STONES["small"].N
     assert STONES["small"].cop < made.cop < STONES["big"].cop
 
 
 @pytest.mark.parametrize("word", ["9 mm", "61 mm", "fine", "stones"])
-def test_what_is_not_simulated_is_said(word):
+def test_unsimulated_properties_are_reported(word):
     with pytest.raises(SettingsError, match="not simulated"):
         GroundChoice(word, "tread").bed()
 
 
-def test_words_multiply_what_the_ground_has():
+def test_descriptors_scale_the_ground_parameters():
     effects = {"s_inf": 0.5, "mu_s": 2.0}
     bed = GroundChoice("small", "tread", effects=effects).bed()
     assert bed.s_inf == pytest.approx(0.5 * STONES["small"].s_inf)

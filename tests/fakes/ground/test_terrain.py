@@ -81,7 +81,7 @@ def releases(F_t):
 
 
 @pytest.mark.parametrize("stones", ["small", "big"])
-def test_a_bed_of_stones_loads_and_lets_go(stones):
+def test_a_bed_of_stones_loads_and_releases(stones):
     found, count = [], 0
     for seed in range(4):
         bed = StoneBed(STONES[stones], 0.0, rng(seed))
@@ -107,7 +107,7 @@ def test_a_bed_of_stones_holds_a_foot_that_stands():
     assert bed.releases == 0
 
 
-def test_a_bed_sinks_under_a_moving_foot_only():
+def test_a_bed_sinks_only_under_a_moving_foot():
     still, moving = (StoneBed(STONES["big"], 0.0, rng(3)) for _ in range(2))
     low = still.surface(0.0)
     drag(moving, travel=0.05)
@@ -117,7 +117,7 @@ def test_a_bed_sinks_under_a_moving_foot_only():
     assert still.step(DT, deep)[2] > moving.step(DT, deep)[2] + 1.0
 
 
-def test_a_bed_has_not_sunk_where_a_lifted_foot_comes_down_moving():
+def test_a_foot_lands_moving_on_a_bed_that_has_not_sunk():
     bed, fresh = (StoneBed(STONES["big"], 0.0, rng(3)) for _ in range(2))
     drag(bed, travel=0.1)
     for _ in range(round(1.5 / DT)):
@@ -142,7 +142,7 @@ def pushed_aside(footing, by, F_n=PRESS):
     ]
 
 
-def test_a_bristle_stretches_up_to_its_limit_and_back_from_there():
+def test_a_bristle_stretches_to_its_limit_and_returns():
     footing, most = Footing(2200.0, 0.0, 0.01, rng()), 0.6 * PRESS
     assert pushed_aside(footing, 0.001) == pytest.approx(2.2)
     assert pushed_aside(footing, 0.009) == pytest.approx(most)
@@ -150,7 +150,7 @@ def test_a_bristle_stretches_up_to_its_limit_and_back_from_there():
     assert pushed_aside(footing, -0.009) == pytest.approx(-most)
 
 
-def test_a_bristle_that_was_let_slip_does_not_stretch_again_by_pressing():
+def test_pressing_does_not_restretch_a_slipped_bristle():
     footing = Footing(2200.0, 0.0, 0.01, rng())
     pushed_aside(footing, 0.01)
     slipped = pushed_aside(footing, 0.0, PRESS / 4)
@@ -158,7 +158,7 @@ def test_a_bristle_that_was_let_slip_does_not_stretch_again_by_pressing():
     assert pushed_aside(footing, 0.0, PRESS) == slipped
 
 
-def test_a_sole_that_was_lifted_has_forgotten_where_it_stuck():
+def test_lifting_the_sole_resets_its_bristle():
     footing = Footing(2200.0, 0.0, 0.01, rng())
     aside = (0.0, 0.0, 0.0, 0.0, 1.0, 0.0, *NO_TURN)
     assert footing.step(0.001, aside, 0.0, PRESS, 0.6)[1] == pytest.approx(-2.2)
@@ -168,7 +168,7 @@ def test_a_sole_that_was_lifted_has_forgotten_where_it_stuck():
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_a_sole_resists_turning_up_to_3_cm_times_the_normal_force(axis):
+def test_resistance_to_turning_is_bounded_by_the_normal_force(axis):
     footing = Footing(2200.0, 0.0, 0.01, rng())  # pressed at the centre of the sole
     rate = [0.0, 0.0, 0.0]
     rate[axis] = 1.0
@@ -204,7 +204,7 @@ def test_the_centre_of_pressure_wanders_as_far_as_it_should():
 
 
 @pytest.mark.parametrize("stones", ["small", "big", "none"])
-def test_a_ground_is_the_same_for_the_same_trial_and_another_for_another(stones):
+def test_a_ground_is_reproducible_by_trial(stones):
     def forces(seed, trial):
         ground = make_terrain(
             GroundChoice(stones, "tread"), 0.1, trial_generator(seed, "S", trial)

@@ -104,7 +104,7 @@ def few():
 
 
 @pytest.mark.slow
-def test_a_foot_slips_on_stones_and_lets_nearly_all_force_go(few):
+def test_a_slip_on_stones_releases_nearly_all_force(few):
     for name in ("S0", "B15"):
         slips = few[name].all_slips
         assert 3.0 <= few[name].slips_per_trial() <= 11.0
@@ -232,7 +232,7 @@ def test_slips_bounce_back_as_often_as_in_the_reference(runs):
         for name in GROUNDS
     ],
 )
-def test_models_err_as_much_as_in_the_reference(folds, model, name):
+def test_model_errors_agree_with_the_reference(folds, model, name):
     errors = [
         np.mean([f.models[model].score.mae for f in folds[seed] if f.terrain == name])
         for seed in SETS

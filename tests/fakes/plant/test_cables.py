@@ -46,7 +46,7 @@ def moved(cables, seconds=0.3):
     return plant.q - START_Q
 
 
-def test_stiff_cables_move_the_arm_as_none_do():
+def test_stiff_cables_act_like_rigid_ones():
     stiff, rigid = moved(40.0), moved(None)
     assert np.abs(rigid).max() > 0.1
     assert np.abs(stiff - rigid).max() < 0.02 * np.abs(rigid).max()
@@ -76,13 +76,13 @@ def test_the_arm_swings_in_the_modes_of_its_cables(resonance):
 
 
 @pytest.mark.parametrize("resonance", [0.0, 41.0])
-def test_cables_that_no_arm_has_are_refused(resonance):
+def test_implausible_cables_are_refused(resonance):
     with pytest.raises(ValueError, match="resonance"):
         free_arm(resonance, STUCK)
 
 
 @pytest.mark.slow
-def test_encoders_count_what_the_motors_turn_and_the_joints_sag_below_them():
+def test_encoders_follow_the_motors_and_joints_sag_below_them():
     plant = free_arm(8.0, STUCK)
     before = angles(plant)
     for _ in range(1000):
@@ -96,14 +96,14 @@ def test_encoders_count_what_the_motors_turn_and_the_joints_sag_below_them():
 
 
 @pytest.mark.slow
-def test_an_arm_on_cables_that_nobody_drives_wins_no_energy():
+def test_an_undriven_arm_on_cables_gains_no_energy():
     plant = free_arm(15.0, draw_friction(CONSTANTS, 0.4, 3, np.zeros(7)))
     plant.qd[:] = 0.3
     speeds = [np.abs(plant.qd).max() for _ in float_for(plant, 1.5)]
     assert max(speeds[-100:]) < 0.05 * max(speeds[:100])
 
 
-def test_brakes_unbend_the_cables():
+def test_brakes_relax_the_cables():
     plant = free_arm(8.0, STUCK)
     list(float_for(plant, 0.5))
     before = plant.q.copy()

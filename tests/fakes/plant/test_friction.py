@@ -62,7 +62,7 @@ def stored(friction):
     return float(friction.coulomb @ (0.5 * friction.breakaway * friction.presliding))
 
 
-def test_every_parameter_is_measured_on_an_arm_or_marked_as_assumed():
+def test_every_parameter_is_measured_or_marked_as_assumed():
     for row in FRICTION_TABLE:
         assert row.low <= row.nominal <= row.high or row.name == "load"
         assert row.low < row.high
@@ -84,14 +84,14 @@ def test_drawn_parameters_lie_within_the_table_and_are_those_of_the_seed():
         assert (drawn(seed + 1).coulomb != friction.coulomb).all()
 
 
-def test_the_arm_of_a_seed_is_always_the_same_and_another_for_another_seed():
+def test_an_arm_is_reproducible_by_seed():
     frictions = []
     for seed in (1, 1, 2):
         frictions.append(make_plant(friction=1.0, seed=seed).friction.coulomb.tolist())
     assert frictions[0] == frictions[1] != frictions[2]
 
 
-def test_the_figures_of_the_share_hold_under_the_weight_of_the_arm():
+def test_friction_under_the_weight_of_the_arm_has_the_stated_share():
     plant = make_plant(friction=1.0, seed=3)
     weight = np.linalg.solve(CONSTANTS.j2mp.T, MODEL.gravity(plant.q))
     # the person's forearm hangs on the simulated arm, too
@@ -99,7 +99,7 @@ def test_the_figures_of_the_share_hold_under_the_weight_of_the_arm():
     assert plant.friction.load_at[1] > 0.1
 
 
-def test_a_joint_that_turns_alone_rubs_with_the_figures_of_the_share():
+def test_a_single_turning_joint_has_the_stated_friction():
     wanted = 0.4 * CONSTANTS.coulomb
     # a differential has one figure for both of its joints: 2.5 and 1.5 agree to 1 %
     found = joint_coulomb(CONSTANTS, nominal(0.4).coulomb)
@@ -122,18 +122,18 @@ def crept(load, tremor):
 
 
 @pytest.mark.slow
-def test_a_constant_load_below_breakaway_moves_nothing_in_a_minute():
+def test_a_constant_load_below_breakaway_moves_no_joint():
     assert crept(0.8, 0.0).max() < 2e-6
 
 
 @pytest.mark.slow
-def test_a_load_with_tremor_moves_no_joint_of_the_arm_in_a_minute():
+def test_a_load_with_tremor_moves_no_joint():
     assert crept(0.6, 0.25)[:4].max() < CREEP
 
 
 @pytest.mark.parametrize("dt", [0.0005, 0.002])
 @pytest.mark.parametrize("seed", [1, 2])
-def test_bristles_give_back_no_more_than_they_have_stored(seed, dt):
+def test_bristles_return_no_more_energy_than_stored(seed, dt):
     friction = drawn(seed)
     motors, rng = Motors(friction, dt), np.random.default_rng(seed)
     tau, least = np.zeros(7), 0.0
@@ -157,7 +157,7 @@ def test_light_motors_stay_still_at_steps_of_a_whole_cycle():
 @pytest.mark.slow
 # 1 N m/s is twice to ten times the break-away of a wrist joint in a second.
 @pytest.mark.parametrize(("rate", "motors"), [(0.1, 7), (1.0, 4)])
-def test_a_motor_breaks_away_at_its_own_torque_however_fast_it_grows(rate, motors):
+def test_breakaway_torque_does_not_depend_on_the_rate(rate, motors):
     """`rate`: of the torque at its joint [N m/s]."""
     friction = drawn(3)
     bench = Motors(friction)
@@ -193,7 +193,7 @@ def test_a_sliding_motor_is_resisted_by_the_steady_torque_of_its_friction(way):
     assert np.mean(found, axis=0) == pytest.approx(np.mean(wanted, axis=0), rel=0.01)
 
 
-def test_an_arm_that_is_borne_forgets_what_bent_its_bristles():
+def test_supporting_an_arm_relaxes_its_bristles():
     plant = make_plant(friction=1.0, support=Support.PERSON)
     plant.hand.let_go()
     for _ in range(2):
@@ -253,7 +253,7 @@ def test_both_motors_of_a_differential_are_one_drive_to_the_implicit_step():
     assert ends[0] == pytest.approx(ends[1], rel=0.05, abs=0.01)
 
 
-def test_the_drives_keep_their_inertia_beside_friction():
+def test_the_drives_keep_their_inertia_with_friction():
     plant = make_plant(friction=0.0)
     release(plant)
     plant.hand.let_go()

@@ -46,7 +46,7 @@ def test_hands_bring_the_idle_arm_to_a_pose_and_hold_it(seed, cables):
     assert np.abs(plant.qd).max() < 1e-3
 
 
-def test_the_way_to_a_pose_is_smooth_and_takes_its_time():
+def test_the_path_to_a_pose_is_smooth_and_takes_its_duration():
     plant = make_plant(friction=0.4, seed=1)
     start = plant.q.copy()
     plant.pose(GOAL, 2.0)
@@ -71,7 +71,7 @@ def test_the_way_to_a_pose_is_smooth_and_takes_its_time():
         (3, 7, "low"),
     ],
 )
-def test_hands_turn_a_joint_until_its_stop_bears(seed, joint, side):
+def test_hands_turn_a_joint_until_its_stop(seed, joint, side):
     plant = make_plant(friction=1.0, seed=seed)
     ends = plant.ends.lower if side == "low" else plant.ends.upper
     near = GOAL.copy()
@@ -106,7 +106,7 @@ def test_the_arm_sinks_when_the_hands_let_go():
     assert plant.hand.phase is HandPhase.AWAY
 
 
-def test_a_person_who_bears_the_arm_keeps_it_where_the_hands_left_it():
+def test_a_supported_arm_stays_where_the_hands_left_it():
     plant = make_plant(friction=0.4, seed=1, support=Support.PERSON)
     hold_at_goal(plant)
     plant.let_go()
@@ -114,7 +114,7 @@ def test_a_person_who_bears_the_arm_keeps_it_where_the_hands_left_it():
     assert np.abs(plant.q - GOAL).max() < POSED
 
 
-def test_a_hand_that_takes_the_foot_after_a_pose_keeps_the_turn_it_finds():
+def test_a_hand_on_the_foot_after_a_pose_keeps_its_orientation():
     plant = make_plant(friction=0.4, seed=1)
     hold_at_goal(plant)
     plant.hand.carry()
@@ -130,7 +130,7 @@ def tilted(x=0.0, y=0.0, z=0.0):
 
 @pytest.mark.parametrize("down", [(0.0, 0.0, -1.0), tilted(0.3, -0.2, -0.9)])
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_hung_weight_shows_as_its_weight_truly_down(seed, down):
+def test_a_hung_weight_reads_as_its_weight_vertically(seed, down):
     plant = make_plant(friction=1.0, seed=seed, down=down)
     hold_at_goal(plant)
     free = np.array(plant.sensor_load(plant.t_ns))
@@ -148,7 +148,7 @@ def test_a_hung_weight_shows_as_its_weight_truly_down(seed, down):
     assert again == pytest.approx(free, abs=0.05)
 
 
-def test_a_hung_weight_has_the_lever_of_the_sole():
+def test_a_hung_weight_acts_at_the_sole():
     plant = make_plant(friction=1.0, seed=1)
     hold_at_goal(plant)
     free = np.array(plant.sensor_load(plant.t_ns))
@@ -159,7 +159,7 @@ def test_a_hung_weight_has_the_lever_of_the_sole():
     assert hung[3:] == pytest.approx(np.cross(lever, hung[:3]), abs=0.01)
 
 
-def test_a_push_shows_in_the_sensor_and_ends():
+def test_a_push_is_measured_by_the_sensor_and_ends():
     plant = make_plant(friction=1.0, seed=1)
     hold_at_goal(plant)
     free = np.array(plant.sensor_load(plant.t_ns))
@@ -174,7 +174,7 @@ def test_a_push_shows_in_the_sensor_and_ends():
     assert after == pytest.approx(free, abs=0.05)
 
 
-def test_a_push_moves_an_arm_that_nobody_holds():
+def test_a_push_moves_an_unsupported_arm():
     def moved(force):
         plant = make_plant(friction=0.4, seed=1, has_hand=False, support=Support.NONE)
         plant.short_windings([False] * 7)
@@ -187,7 +187,7 @@ def test_a_push_moves_an_arm_that_nobody_holds():
     assert aside[1] > 0.01
 
 
-def test_a_twist_shows_in_the_sensor_turns_joint_7_and_ends():
+def test_a_twist_is_measured_turns_joint_7_and_ends():
     plant = make_plant(friction=0.4, seed=1, has_hand=False, support=Support.NONE)
     pass_time(plant, 0.1)
     free, before = np.array(plant.sensor_load(plant.t_ns)), plant.q[6]

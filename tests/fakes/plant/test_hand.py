@@ -101,7 +101,7 @@ def view(x=0.0, vx=0.0):
     return HandView((x, 0.0, 0.0), (vx, 0.0, 0.0), (x, 0.0, 0.0), (vx, 0.0, 0.0))
 
 
-def test_a_hand_gives_way_after_a_slip_but_not_before_it_could_know():
+def test_a_hand_yields_to_a_slip_after_its_reaction_time():
     hand = Hand(0.0005)
     hand.push(Pace(), np.random.default_rng(5))
     for _ in range(10_000):
@@ -137,7 +137,7 @@ def test_a_hand_that_rests_pushes_no_more(plant):
     assert abs(sole(plant)[0] - where) < 1e-3
 
 
-def test_a_hand_that_let_go_does_nothing(plant):
+def test_a_released_hand_exerts_nothing(plant):
     plant.hand.let_go()
     assert plant.hand.step(AT_REST) == (0.0, 0.0, 0.0)
     assert not plant.hand.is_holding

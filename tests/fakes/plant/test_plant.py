@@ -71,7 +71,7 @@ def sunk(seconds, windings=1.0, **options):
     return float(np.linalg.norm(sole(plant) - before))
 
 
-def test_an_idle_arm_sinks_on_its_shorted_windings():
+def test_an_idle_arm_sinks_slowly_on_shorted_windings():
     assert 0.12 < sunk(0.5) < 0.16
     assert sunk(1.0) > 1.8 * sunk(0.5)  # it goes on: nothing holds it
 
@@ -93,7 +93,7 @@ def test_an_arm_with_open_windings_falls():
     assert sole(plant)[2] < 0.15 - 0.03
 
 
-def test_a_person_who_holds_an_arm_soon_bears_it():
+def test_a_person_holding_an_arm_soon_supports_it():
     plant = make_plant(height=0.15)
     release(plant)
     for _ in float_for(plant, 0.5):
@@ -193,7 +193,7 @@ def test_a_torque_moves_the_joint_that_it_acts_on_by_its_inertia():
     assert plant.qd / 0.002 == pytest.approx(wanted, rel=0.02, abs=0.05)
 
 
-def test_the_sensor_feels_the_weight_of_the_foot():
+def test_the_sensor_measures_the_weight_of_the_foot():
     plant = make_plant()
     load = plant.sensor_load(10 * CYCLE_NS)
     # the foot points down: the sensor's z axis too, so the weight pulls along it
@@ -210,7 +210,7 @@ def felt_in_base(plant):
     return rotation @ load[:3], rotation @ moment
 
 
-def test_the_sensor_feels_the_inertia_of_the_foot():
+def test_the_sensor_measures_the_inertia_of_the_foot():
     plant = make_plant()
     release(plant)
     plant.hand.let_go()
@@ -245,7 +245,7 @@ class Pusher:
 
 
 @pytest.mark.parametrize("component", range(6))
-def test_the_sensor_feels_force_and_moment_of_the_ground(component):
+def test_the_sensor_measures_force_and_moment_of_the_ground(component):
     plant = make_plant()
     plant.advance(CYCLE_NS)
     before = np.concatenate(felt_in_base(plant))
@@ -276,7 +276,7 @@ def test_the_ground_moves_the_joints_through_the_jacobian_of_the_sole(component)
     assert plant.qd / 0.002 == pytest.approx(wanted, rel=0.03, abs=0.05)
 
 
-def test_time_goes_on_in_whole_substeps_only():
+def test_time_advances_in_whole_substeps_only():
     plant = make_plant()
     plant.advance(CYCLE_NS - 1)
     assert plant.t_ns == 3 * CYCLE_NS // 4
@@ -284,7 +284,7 @@ def test_time_goes_on_in_whole_substeps_only():
     assert plant.t_ns == CYCLE_NS
 
 
-def test_counts_are_what_encoders_on_the_motors_show():
+def test_counts_are_those_of_motor_encoders():
     plant = make_plant()
     angle = CONSTANTS.j2mp @ plant.q
     counts = angle * np.array(CONSTANTS.cts) / (2.0 * np.pi)
@@ -292,7 +292,7 @@ def test_counts_are_what_encoders_on_the_motors_show():
     assert (counts - plant.counts() < 1.0).all()
 
 
-def test_the_truth_is_one_row_per_cycle_from_when_it_was_asked_for():
+def test_the_truth_has_one_row_per_cycle_from_its_request():
     plant = make_plant()
     plant.advance(5 * CYCLE_NS)
     assert plant.take_truth().t_ns == []
@@ -304,7 +304,7 @@ def test_the_truth_is_one_row_per_cycle_from_when_it_was_asked_for():
     assert truth.table()[0, 7:10] == pytest.approx(sole(plant), abs=1e-12)
 
 
-def test_dry_friction_holds_what_is_weaker_than_it():
+def test_dry_friction_holds_smaller_torques():
     plant = make_plant(friction=1.0)
     release(plant)
     plant.hand.let_go()
@@ -329,7 +329,7 @@ def test_smaller_steps_give_the_same_motion():
     assert ends[0] == pytest.approx(ends[1], abs=2e-3)
 
 
-def test_joints_go_on_with_their_new_velocity_and_old_arrays_stay_as_they_were():
+def test_integration_uses_the_new_velocity_and_keeps_old_arrays():
     q, qdd, dt = np.linspace(0.0, 1.0, 7), np.linspace(3.0, -3.0, 7), 0.0005
     joints = JointState(q, dt)
     before = joints.rows[0]
@@ -342,7 +342,7 @@ def test_joints_go_on_with_their_new_velocity_and_old_arrays_stay_as_they_were()
     assert before.tolist() == q.tolist()
 
 
-def test_a_joint_that_is_moved_keeps_its_velocity_and_one_that_rests_loses_it():
+def test_a_driven_joint_keeps_its_velocity_and_a_resting_one_stops():
     joints = JointState(np.zeros(7), 0.001)
     rate = joints.step(np.ones(7))[1]
     joints.move(np.full(7, 0.5))
@@ -352,14 +352,14 @@ def test_a_joint_that_is_moved_keeps_its_velocity_and_one_that_rests_loses_it():
     assert joints.step(np.zeros(7))[0].tolist() == [0.5] * 7
 
 
-def test_a_sensor_that_is_read_within_a_cycle_does_not_drive_the_arm_on():
+def test_reading_the_sensor_within_a_cycle_does_not_advance_the_arm():
     plant = make_plant()
     release(plant)
     plant.sensor_load(CYCLE_NS + CYCLE_NS // 2)
     assert plant.t_ns == CYCLE_NS  # the load is that of the cycle that has ended
 
 
-def test_loads_on_foot_hand_and_joints_come_together_in_the_joints():
+def test_loads_on_foot_hand_and_joints_add_up():
     rng = np.random.default_rng(1)
     j2mp = rng.standard_normal((7, 7))
     loads = JointLoads(j2mp)
@@ -370,7 +370,7 @@ def test_loads_on_foot_hand_and_joints_come_together_in_the_joints():
 
 
 @pytest.mark.parametrize(("away", "times"), [(0.5, 1), (0.02, 5)])
-def test_resistance_is_taken_at_every_substep_near_a_stop(monkeypatch, away, times):
+def test_resistance_near_a_stop_is_updated_every_substep(monkeypatch, away, times):
     plant = make_plant()
     plant.q[6] = CONSTANTS.q_upper[6] - away
     release(plant)
@@ -385,7 +385,7 @@ def test_resistance_is_taken_at_every_substep_near_a_stop(monkeypatch, away, tim
     assert len(taken) == times  # at the beginning of the cycle, and in four substeps
 
 
-def test_an_arm_that_is_let_go_within_a_cycle_has_its_drives_from_the_start():
+def test_releasing_an_arm_within_a_cycle_enables_its_drives_at_once():
     turned = []
     for held_ns in (0, CYCLE_NS // 2):
         plant = make_plant()

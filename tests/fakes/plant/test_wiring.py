@@ -23,27 +23,27 @@ def test_wiring_as_built_changes_nothing():
     assert wiring.told_of(counts) == pytest.approx(counts)
 
 
-def test_a_turned_plug_and_swapped_cables():
+def test_reversed_and_swapped_wiring_permute_the_motors():
     reversed_2 = np.diag([1.0, -1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
     assert Wiring(reversed_2).applied_torques(UNITS)[1] == 200
     made = Wiring(swapped(4, 5)).applied_torques(UNITS)
     assert made[4:6] == [60, 50]
 
 
-def test_swapped_encoders_tell_of_the_other_motor_from_home_on():
+def test_swapped_encoders_report_the_other_motor_relative_to_home():
     home = np.full(7, 1000.0)
     wiring = Wiring(counts=swapped(4, 5), home=home)
     told = wiring.told_of(home + np.array([0, 0, 0, 0, 10, 20, 0]))
     assert told[4:6].tolist() == [1020.0, 1010.0]
 
 
-def test_behind_a_torn_cable_the_rotor_stands_and_the_joint_has_no_torque():
+def test_a_torn_cable_stops_the_rotor_and_removes_joint_torque():
     wiring = Wiring(torn=2, torn_at=777.0)
     assert wiring.applied_torques(UNITS)[1] == 0
     assert wiring.told_of(np.zeros(7))[1] == 777.0
 
 
-def test_the_arm_moves_by_what_its_motors_make():
+def test_the_arm_moves_by_the_torque_of_its_motors():
     def turned(wiring):
         plant = ArmPlant(CONSTANTS, TOOL, FRAME, START_Q)
         plant.wiring = wiring

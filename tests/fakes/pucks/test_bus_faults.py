@@ -47,7 +47,7 @@ def test_the_next_replies_are_lost_and_no_more(rig, faults):
     assert [ids(ask(rig)).count(THREE) for _ in range(4)] == [0, 0, 1, 1]
 
 
-def test_a_share_of_the_replies_is_lost_the_same_one_in_every_run():
+def test_a_reproducible_share_of_replies_is_lost():
     def losses():
         rig = Rig(counts=HOME_COUNTS)
         rig.network.faults.drop(THREE, None, share=0.2)
@@ -58,7 +58,7 @@ def test_a_share_of_the_replies_is_lost_the_same_one_in_every_run():
     assert lost == losses()
 
 
-def test_a_late_reply_comes_late_and_the_others_do_not(rig, faults):
+def test_only_the_late_reply_is_late(rig, faults):
     faults.delay(THREE, 5 * MS)
     assert ids(ask(rig)) == [i for i in ALL if i != THREE]
     rig.rest(5 * MS)
@@ -76,7 +76,7 @@ def test_replies_of_one_puck_never_overtake_each_other(rig, faults):
     assert seen == [100, 200, 300, 400]
 
 
-def test_a_doubled_reply_comes_twice(rig, faults):
+def test_a_doubled_reply_arrives_twice(rig, faults):
     faults.duplicate(THREE)
     assert [ids(ask(rig)).count(THREE) for _ in range(2)] == [2, 1]
 
@@ -100,7 +100,7 @@ def test_a_flood_uses_its_share_of_the_bus(rig, faults, load):
     assert set(found) == set(FOREIGN_IDS)
 
 
-def test_a_flood_delays_replies_as_far_as_its_identifiers_win(rig, faults):
+def test_a_flood_delays_replies_by_identifier_priority(rig, faults):
     def last_reply(chosen):
         faults.clear_faults()
         faults.flood(0.4, chosen)
@@ -135,7 +135,7 @@ def send(rig, can_id=0x404, data=b"\x30"):
     rig.bus.send(can.Message(arbitration_id=can_id, is_extended_id=False, data=data))
 
 
-def test_a_controller_that_is_off_takes_frames_and_tells_it_once(rig, faults):
+def test_a_bus_off_controller_accepts_frames_and_reports_once(rig, faults):
     faults.go_off()
     send(rig)
     told = rig.bus.recv(0)
@@ -150,7 +150,7 @@ def test_a_controller_that_is_off_takes_frames_and_tells_it_once(rig, faults):
     assert ids(ask(rig)) == ALL
 
 
-def test_frames_that_nobody_acknowledges_wait_until_the_queue_is_full(rig, faults):
+def test_unacknowledged_frames_wait_until_the_queue_is_full(rig, faults):
     faults.stop_acknowledging()
     for _ in range(11):
         send(rig)
@@ -166,7 +166,7 @@ def test_frames_that_nobody_acknowledges_wait_until_the_queue_is_full(rig, fault
     assert None not in replies  # all that waited came out
 
 
-def test_mending_ends_every_fault_of_the_wire(rig, faults):
+def test_repairing_ends_every_bus_fault(rig, faults):
     faults.drop(THREE, None)
     faults.flood(0.9)
     ask(rig)
@@ -175,7 +175,7 @@ def test_mending_ends_every_fault_of_the_wire(rig, faults):
     assert ids(ask(rig)) == ALL
 
 
-def test_swapped_replies_arrive_behind_the_others(rig):
+def test_swapped_replies_arrive_last(rig):
     network_faults(rig.network)["reply-swapped"]()
     assert ids(ask(rig)) == [*(i for i in ALL if i != THREE), THREE]
 
@@ -189,9 +189,7 @@ def test_swapped_replies_arrive_behind_the_others(rig):
         ("safety-voltage", "voltage", SafetyMode.E_STOP),
     ],
 )
-def test_a_monitor_faults_and_can_be_cleared_once_it_is_mended(
-    rig, name, monitor, mode
-):
+def test_a_faulted_monitor_can_be_cleared_once_repaired(rig, name, monitor, mode):
     def move(cycles=60):  # of 2 ms: longer than the heartbeat
         for _ in range(cycles):
             rig.motors.position[3] += 20
@@ -216,7 +214,7 @@ def test_a_monitor_faults_and_can_be_cleared_once_it_is_mended(
     ("name", "request_", "ill", "well"),
     [("puck-hot", 9, 72, 35), ("puck-error", 4, 7, 0)],
 )
-def test_an_ill_puck_says_so_until_it_is_mended(rig, name, request_, ill, well):
+def test_a_faulty_puck_reports_its_fault_until_repaired(rig, name, request_, ill, well):
     def answer():
         rig.link.send(3, bytes((request_,)))
         rig.rest(MS)
@@ -228,7 +226,7 @@ def test_an_ill_puck_says_so_until_it_is_mended(rig, name, request_, ill, well):
     assert answer() == well
 
 
-def test_a_puck_that_rebooted_is_silent_for_positions_but_not_dead(rig):
+def test_a_rebooted_puck_answers_no_positions_but_other_requests(rig):
     network_faults(rig.network)["puck-reboot"]()
     assert ids(ask(rig)) == [i for i in ALL if i != THREE]
     rig.link.send(3, b"\x05")

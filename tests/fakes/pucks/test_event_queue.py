@@ -7,7 +7,7 @@ def schedule_of(log):
     return schedule
 
 
-def test_plans_and_alarm_come_in_order_of_time():
+def test_plans_and_alarm_fire_in_time_order():
     log = []
     schedule = schedule_of(log)
     schedule.after(30, lambda: log.append("late"))
@@ -17,7 +17,7 @@ def test_plans_and_alarm_come_in_order_of_time():
     assert log == ["early", "alarm", "late"]
 
 
-def test_a_plan_puts_off_an_alarm_of_the_same_instant():
+def test_a_plan_defers_an_alarm_of_the_same_instant():
     log = []
     schedule = schedule_of(log)
     schedule.set_alarm(10)
@@ -50,7 +50,7 @@ def test_plans_of_one_instant_keep_their_order():
     assert log == [0, 1, 2]
 
 
-def test_what_a_plan_plans_for_now_happens_now():
+def test_a_plan_made_for_the_present_fires_at_once():
     log = []
     schedule = schedule_of(log)
     schedule.after(5, lambda: schedule.after(0, lambda: log.append(schedule.now_ns)))

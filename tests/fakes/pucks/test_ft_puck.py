@@ -63,14 +63,14 @@ def test_a_get_is_answered_with_the_known_bytes(request_, reply):
     assert Host().say(request_) == [reply]
 
 
-def test_one_question_for_the_wrench_has_two_answers():
+def test_one_wrench_request_has_two_replies():
     host = Host((1.0, -2.5, -9.76, 0.0, -0.249, 0.015))
     force, torque = host.say("36")
     assert force == "50a 00 01 80 fd 3d f6"  # 256 counts a newton
     assert torque == "50b 00 00 04 fc 3d 00"  # 4096 counts a newton metre
 
 
-def test_the_wrench_is_that_of_75_us_after_the_question():
+def test_the_wrench_is_sampled_at_a_fixed_delay_after_the_request():
     host = Host()
     host.network.receive(0, 8, b"\x36")
     host.network.advance(74_999)
@@ -79,14 +79,14 @@ def test_the_wrench_is_that_of_75_us_after_the_question():
     assert (ready_ns, decode_force(data)[0]) == (75_000, 8.0)
 
 
-def test_components_are_told_one_by_one_as_in_the_frames():
+def test_single_components_agree_with_the_frames():
     host = Host(LOAD)
     force, torque = host.say("36")
     told = "".join(host.say(f"{n:02x}")[0][-5:].replace(" ", "") for n in range(48, 54))
     assert told == (force[4:] + torque[4:]).replace(" ", "")
 
 
-def test_readings_come_in_the_steps_of_the_data_sheet():
+def test_readings_have_the_data_sheet_resolution():
     host = Host([0.51 * step for step in STEPS])
     force, torque, _ = host.wrench()
     # Half a count of the frame.
@@ -94,14 +94,14 @@ def test_readings_come_in_the_steps_of_the_data_sheet():
     assert torque == pytest.approx(STEPS[3:], abs=0.00013)
 
 
-def test_a_set_is_never_answered_but_an_led_is_kept():
+def test_a_set_has_no_reply_but_an_led_is_stored():
     host = Host()
     assert host.say("bc 00 01 00 00 00") == []
     assert host.say("3c") == ["506 bc 00 01 00"]
 
 
 @pytest.mark.parametrize(("number", "count"), [("ba", 36), ("bb", 6)])
-def test_calibrations_are_taken_without_a_word(number, count):
+def test_calibrations_are_accepted_without_a_reply(number, count):
     host = Host(LOAD)
     before = host.say("36")
     for _ in range(count):
@@ -124,7 +124,7 @@ def test_only_zero_tares():
     assert host.wrench()[0][0] == 1.0
 
 
-def test_a_saturated_gauge_is_told_and_stays_told_until_the_tare():
+def test_a_saturated_gauge_stays_flagged_until_the_tare():
     host = Host()
     assert len(host.say("36")[1]) == len("50b") + 3 * 6  # six bytes
     host.load[2] = -140.0
@@ -168,7 +168,7 @@ def test_the_same_errors_as_on_a_serial_sensor_are_added():
     assert force[0] == pytest.approx(twin.apply(75_000, REST)[0], abs=0.03)
 
 
-def test_a_sleeping_sensor_knows_the_monitors_properties_only():
+def test_a_sleeping_sensor_has_only_monitor_properties():
     host = Host(are_asleep=True)
     assert host.say("05") == ["506 85 00 00 00"]
     assert host.say("00") == ["506 80 00 05 00"]
@@ -186,7 +186,7 @@ def test_a_woken_sensor_is_silent_while_it_boots():
     assert len(host.say("36")) == 2
 
 
-def test_a_reset_sensor_is_back_in_its_monitor_and_has_lost_its_tare():
+def test_a_reset_sensor_is_in_its_monitor_without_its_tare():
     host = Host(LOAD)
     host.say("b6 00 00 00 00 00")
     host.say("85 00 00 00 00 00")
@@ -204,7 +204,7 @@ def test_a_rebooted_sensor_sleeps():
     assert host.say("05") == ["506 85 00 00 00"]
 
 
-def test_an_e_stop_takes_the_sensor_off_the_bus_even_in_mid_answer():
+def test_an_e_stop_removes_the_sensor_even_during_a_reply():
     host = Host()
     host.network.receive(0, 8, b"\x36")
     host.network.pendant("estop")
@@ -219,7 +219,7 @@ def test_a_stopped_arm_has_no_sensor():
     assert Host(safety_mode=SafetyMode.E_STOP).say("05") == []
 
 
-def test_a_mute_sensor_hears_and_does_not_speak():
+def test_a_mute_sensor_receives_but_does_not_send():
     host = Host(LOAD)
     host.network.silence(8)
     assert host.say("05") == host.say("36") == host.say("40") == []
@@ -228,14 +228,14 @@ def test_a_mute_sensor_hears_and_does_not_speak():
     assert host.wrench()[0] == (0, 0, 0)
 
 
-def test_frames_to_the_whole_bus_or_arm_are_not_for_the_sensor():
+def test_the_sensor_ignores_frames_to_the_whole_bus_or_arm():
     host = Host()
     heard = host.say("05", 0x400) + host.say("05", 0x404)
     assert heard
     assert not [frame for frame in heard if frame.startswith("50")]
 
 
-def test_a_network_without_a_sensor_has_nothing_to_silence():
+def test_a_network_without_a_sensor_refuses_to_silence_it():
     network = PuckNetwork(Motors())
     network.silence(8)
     network.reboot(8)

@@ -66,7 +66,7 @@ def test_a_get_is_answered_with_the_known_bytes(can_id, request_, reply):
     assert Host().say(can_id, request_) == [reply]
 
 
-def test_answers_come_75_to_150_us_after_the_question():
+def test_replies_follow_requests_within_the_documented_delay():
     host = Host()
     host.network.receive(0, 3, b"\x05")
     ((ready_ns, _, _),) = host.network.due(MS)
@@ -85,7 +85,7 @@ def test_the_whole_arm_reports_its_position_in_node_order():
     ]
 
 
-def test_positions_are_latched_75_us_after_the_request():
+def test_positions_are_latched_at_a_fixed_delay_after_the_request():
     host = Host()
     host.network.receive(0, 1, b"\x30")
     host.network.advance(74_999)
@@ -108,11 +108,11 @@ def test_an_unused_node_is_silent(node):
 
 
 @pytest.mark.parametrize("data", ["2b 00", "7f", "85", "", "85 01 02 00"])
-def test_what_no_device_understands_is_not_answered(data):
+def test_unknown_requests_are_not_answered(data):
     assert Host().say(1, data) == []
 
 
-def test_a_set_is_never_answered_but_kept():
+def test_a_set_is_stored_without_a_reply():
     host = Host()
     assert host.say(1, "ab 00 e8 03 00 00") == []
     assert host.say(1, "2b") == ["426 ab 00 e8 03"]
@@ -132,7 +132,7 @@ def test_set_p_moves_the_position_and_not_the_absolute_encoder():
     assert host.say(1, "42") == mech
 
 
-def test_sleeping_pucks_answer_the_monitors_properties_only():
+def test_sleeping_pucks_answer_only_monitor_properties():
     host = Host(ASLEEP)
     assert host.say(1, "05") == ["426 85 00 00 00"]
     assert host.say(1, "00") == ["426 80 00 05 00"]
@@ -149,13 +149,13 @@ def test_a_woken_puck_is_silent_while_it_boots():
     assert host.say(1, "00") == ["426 80 00 c8 00"]
 
 
-def test_power_up_loses_the_positions():
+def test_power_up_loses_positions():
     host = Host(NetworkOptions(is_zeroed=False))
     assert host.say(2, "30") != ["443 3f 70 1f"]
     assert host.say(0x00A, "2a") == ["546 aa 00 00 00"]
 
 
-def test_a_reset_puck_is_back_in_its_monitor():
+def test_a_reset_puck_is_in_its_monitor():
     host = Host()
     host.say(3, "85 00 00 00 00 00")
     assert host.say(3, "05") == []
@@ -173,7 +173,7 @@ def test_a_rebooted_puck_forgets_torque_and_position():
     assert len(host.say(0x404, "30")) == 6
 
 
-def test_a_mute_puck_hears_and_does_not_speak():
+def test_a_mute_puck_receives_but_does_not_send():
     host = Host()
     host.activate()
     host.network.silence(1)
@@ -192,7 +192,7 @@ def test_torque_is_applied_in_torque_mode_only():
     assert host.motors.units == [1, 2, 3, 4, 5, 6, 7]
 
 
-def test_a_puck_takes_the_slot_of_its_index():
+def test_a_puck_reads_the_slot_of_its_index():
     host = Host()
     host.say(1, encode_set(70, 2))  # PIDX
     host.activate()
@@ -214,7 +214,7 @@ def test_a_torque_frame_of_other_firmware_moves_nothing():
     assert host.motors.units == [0] * 7
 
 
-def test_activation_is_broadcast_and_takes_the_brakes_off():
+def test_activation_is_broadcast_and_releases_the_brakes():
     host = Host()
     assert host.motors.is_idle
     host.network.pendant("activate")
@@ -240,7 +240,7 @@ def test_pucks_that_are_idled_brake_though_the_module_is_active():
         (None, -1, SafetyMode.IDLE),
     ],
 )
-def test_the_host_can_lower_the_mode_and_never_raise_it(options, value, expected):
+def test_the_host_can_lower_but_not_raise_the_mode(options, value, expected):
     host = Host(options)
     host.say(0x00A, encode_set(8, value))
     assert host.network.safety_mode is expected
@@ -254,7 +254,7 @@ def test_the_unlock_sequence_unlocks_nothing():
     assert host.network.safety_mode is SafetyMode.IDLE
 
 
-def test_an_e_stop_takes_power_positions_and_zero():
+def test_an_e_stop_clears_power_positions_and_zero():
     host = Host()
     host.network.pendant("estop")
     host.hear(MS)
@@ -264,7 +264,7 @@ def test_an_e_stop_takes_power_positions_and_zero():
     assert host.say(0x00A, "2b") == ["546 ab 00 49 42 79 00"]
 
 
-def test_released_pucks_come_back_asleep():
+def test_released_pucks_return_asleep():
     host = Host(STOPPED)
     host.network.pendant("idle")
     host.hear(MS)
@@ -272,7 +272,7 @@ def test_released_pucks_come_back_asleep():
     assert host.say(1, "05") == ["426 85 00 00 00"]
 
 
-def test_activating_a_stopped_arm_does_nothing():
+def test_activating_a_stopped_arm_has_no_effect():
     host = Host(STOPPED)
     host.network.pendant("activate")
     assert host.network.safety_mode is SafetyMode.E_STOP
@@ -338,7 +338,7 @@ def test_the_module_judges_commanded_torque(units, level, mode):
     assert host.network.safety_mode is mode
 
 
-def test_a_smaller_torque_puts_the_warning_out():
+def test_a_smaller_torque_clears_the_warning():
     host = Host()
     host.activate()
     host.say(0x401, encode_torques((0, 0, 5000, 0)))
@@ -353,7 +353,7 @@ def test_limits_return_to_their_power_up_values():
     assert host.say(0x00A, "30") == ["546 b0 00 54 14"]
 
 
-def test_a_value_beyond_its_width_wraps_as_on_a_16_bit_device():
+def test_a_value_beyond_its_width_wraps():
     host = Host()
     host.say(1, encode_set(86, 70000))
     assert host.say(1, "56") == ["426 d6 00 70 11"]
@@ -367,7 +367,7 @@ def test_the_next_event_is_the_answer_that_is_due():
 
 
 @given(st.lists(st.tuples(st.integers(0, 0x7FF), st.binary(max_size=8)), max_size=20))
-def test_no_bytes_upset_the_network(frames):
+def test_no_bytes_disturb_the_network(frames):
     host = Host()
     host.network.pendant("activate")
     for can_id, data in frames:

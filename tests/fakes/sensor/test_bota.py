@@ -46,14 +46,14 @@ def configured(options: BotaOptions = FAST) -> SensorStream:
     return stream
 
 
-def test_frame_is_emitted_when_its_last_byte_has_left_the_wire():
+def test_a_frame_arrives_when_its_last_byte_is_sent():
     stream = bota_stream(ramp, options=FAST)
     assert stream.due(WIRE_NS - 1) == []
     ((t_ns, data),) = stream.due(WIRE_NS)
     assert (t_ns, len(data)) == (WIRE_NS, 37)
 
 
-def test_next_event_is_when_bytes_come():
+def test_the_next_event_is_the_next_arrival():
     stream = bota_stream(ramp, options=FAST)
     for _ in range(5):
         event = stream.next_event_ns()
@@ -93,7 +93,7 @@ def test_shipped_device_sends_100_hz():
     assert len(stream.due(S)) == pytest.approx(100, abs=1)
 
 
-def test_fast_device_clock_shows_more_time_than_passed():
+def test_a_fast_device_clock_runs_ahead():
     options = BotaOptions(is_running=True, sinc=64, clock_error_ppm=200)
     frames = frames_of(bota_stream(ramp, options=options), 10 * S)
     host_us = frames[-1].wrench[0]
@@ -109,7 +109,7 @@ def test_device_clock_wraps_at_32_bits():
     assert [frame.device_us for frame in frames] == [2**32 - 1250, 0, 1250]
 
 
-def test_boot_text_comes_late_and_before_the_stream():
+def test_boot_text_is_delayed_and_precedes_the_stream():
     stream = bota_stream(ramp)
     assert stream.due(300 * MS) == []
     text = find_boot_text(text_of(stream, 900 * MS))
@@ -125,7 +125,7 @@ def test_commands_during_the_boot_are_lost():
     assert parsed(data)
 
 
-def test_configuration_mode_stops_the_stream_behind_the_last_frame():
+def test_configuration_mode_stops_the_stream_after_a_whole_frame():
     stream = bota_stream(ramp, options=FAST)
     stream.due(10 * MS)
     stream.receive(10 * MS + 100_000, b"C")
@@ -135,7 +135,7 @@ def test_configuration_mode_stops_the_stream_behind_the_last_frame():
     assert stream.next_event_ns() is None
 
 
-def test_commands_may_come_byte_by_byte():
+def test_commands_may_arrive_byte_by_byte():
     stream = configured()
     for k, byte in enumerate(b"f,64,0,0,0"):
         stream.receive(100 * MS + k * 5 * MS, bytes((byte,)))
@@ -172,7 +172,7 @@ def test_refused_letters_are_answered_with_a_code():
     assert find_acknowledgements(text_of(stream, S)) == [Acknowledgement("R", 1)]
 
 
-def test_deaf_device_goes_on_streaming():
+def test_a_device_that_ignores_commands_keeps_streaming():
     stream = bota_stream(
         ramp, options=BotaOptions(is_running=True, sinc=64, is_deaf=True)
     )
@@ -201,7 +201,7 @@ def test_hard_reset_boots_again_with_its_clock_at_zero():
     assert first.device_us == 1_000_000  # from reset to the first sample
 
 
-def test_silent_device_says_nothing_until_it_speaks():
+def test_a_silent_device_sends_nothing_until_restored():
     stream = bota_stream(ramp, options=FAST)
     stream.go_silent()
     assert stream.due(S) == []
@@ -216,7 +216,7 @@ def test_paused_device_loses_samples_but_no_time():
     assert frames_of(stream, 60 * MS)[0].device_us == 50_000
 
 
-def test_line_too_slow_skips_and_says_so():
+def test_a_line_that_is_too_slow_skips_and_flags_samples():
     options = BotaOptions(is_running=True, sinc=64, baudrate=115200)
     frames = frames_of(bota_stream(ramp, options=options), S)
     assert len(frames) <= 311  # what 115200 baud can carry
@@ -233,7 +233,7 @@ def test_damage_hits_one_frame(fault):
     assert steps == [2500] + [1250] * (len(frames) - 2)
 
 
-def test_damage_does_what_it_says():
+def test_each_kind_of_damage_has_its_effect():
     assert damage(b"abc", ByteFault.FLIP, 1) == b"acc"
     assert damage(b"abc", ByteFault.DROP, 1) == b"ac"
     assert damage(b"abc", ByteFault.DOUBLE, 1) == b"abbc"

@@ -42,7 +42,7 @@ def test_resolution_rounds_to_steps():
 
 @pytest.mark.parametrize("gap_s", [0.3, 3.0, 30.0])
 @pytest.mark.parametrize(("name", "time"), [("drift", 3.0), ("walk", 120.0)])
-def test_a_zero_wanders_by_its_deviation_in_its_time(name, time, gap_s):
+def test_a_zero_wanders_with_its_deviation_and_time_constant(name, time, gap_s):
     def around_gap(seed):
         errors = make_errors(seed, **{name: 1.0})
         shown = [errors.apply(k * MS, FREE)[:3] for k in range(3)]
@@ -57,7 +57,7 @@ def test_a_zero_wanders_by_its_deviation_in_its_time(name, time, gap_s):
     assert np.corrcoef(before, after)[0, 1] == pytest.approx(expected, abs=0.08)
 
 
-def test_drift_stands_still_when_no_time_passes():
+def test_drift_needs_time_to_pass():
     errors = make_errors(drift=0.22)
     first = errors.apply(5 * MS, FREE)
     assert errors.apply(5 * MS, FREE) == first
@@ -73,7 +73,7 @@ def test_the_same_generator_gives_the_same_sensor():
     assert shown(7) != shown(8)
 
 
-def test_a_new_source_of_randomness_changes_what_comes_and_not_what_is():
+def test_a_new_generator_changes_only_future_errors():
     def path(seed):
         errors = make_errors(walk=0.2, drift=0.22)
         before = errors.apply(0, FREE)[0]
@@ -87,7 +87,7 @@ def test_a_new_source_of_randomness_changes_what_comes_and_not_what_is():
     assert path(2)[2] != late
 
 
-def test_a_tare_removes_what_is_there_at_its_moment():
+def test_a_tare_removes_the_present_reading():
     remains = []
     for seed in range(150):
         errors = make_errors(seed, walk=FORCE_ERRORS.walk, drift=FORCE_ERRORS.drift)
@@ -117,7 +117,7 @@ def load_errors(**scale) -> LoadErrors:
 PRESSED = (0.0, 0.0, 10.0, 0.0, 0.0, 0.0)
 
 
-def test_the_reading_takes_on_a_load_late_and_in_the_end_wholly():
+def test_creep_delays_but_does_not_lose_a_load():
     errors = load_errors(creep=0.01)
     errors.update(0.0, FREE)
     assert errors.update(0.0, PRESSED)[2] == pytest.approx(-0.1)
@@ -125,7 +125,7 @@ def test_the_reading_takes_on_a_load_late_and_in_the_end_wholly():
     assert errors.update(200.0, PRESSED)[2] == pytest.approx(0.0, abs=1e-4)
 
 
-def test_going_and_coming_differ_by_the_hysteresis():
+def test_loading_and_unloading_differ_by_the_hysteresis():
     errors = load_errors(hysteresis=0.01)
     errors.update(0.0, FREE)
     loads = [(0.0, 0.0, load, 0.0, 0.0, 0.0) for load in (10.0, 20.0, 10.0)]
@@ -134,7 +134,7 @@ def test_going_and_coming_differ_by_the_hysteresis():
     assert (going, coming) == pytest.approx((-0.05, 0.05))
 
 
-def test_another_axis_shows_in_proportion_to_its_load_and_no_axis_in_itself():
+def test_crosstalk_is_proportional_and_off_diagonal():
     errors = load_errors(cross_talk=0.003)
     loads = np.outer((1.0, 2.0), PRESSED)
     once, twice = (np.array(errors.update(0.0, load)) for load in loads.tolist())
@@ -143,7 +143,7 @@ def test_another_axis_shows_in_proportion_to_its_load_and_no_axis_in_itself():
     assert twice == pytest.approx(2 * once)
 
 
-def test_hardly_any_tare_of_a_sound_sensor_leaves_the_limit_of_the_known_pose():
+def test_nearly_all_tares_of_a_sound_sensor_pass_the_known_pose_check():
     shown = [SensorErrors(np.random.default_rng(k)).apply(0, FREE) for k in range(2000)]
     white = 3 * FORCE_ERRORS.white**2  # averages away in a tare
     sizes = np.sqrt(np.maximum((np.array(shown)[:, :3] ** 2).sum(axis=1) - white, 0.0))

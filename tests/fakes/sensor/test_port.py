@@ -67,7 +67,7 @@ def test_bytes_arrive_when_they_are_due(ticker, time):
     assert port.read(100) == b""
 
 
-def test_opening_throws_away_what_was_sent_before(ticker, time):
+def test_opening_discards_earlier_bytes(ticker, time):
     time.now = 1000
     port = FakeSerialPort(ticker, time)
     assert ticker.opened_ns == [1000]
@@ -88,7 +88,7 @@ def test_next_event_is_that_of_the_device(ticker, time):
     assert port.next_event_ns() == 30
 
 
-def test_what_nobody_reads_is_lost_and_counted(ticker, time):
+def test_unread_bytes_are_lost_and_counted(ticker, time):
     port = FakeSerialPort(ticker, time)
     time.now = 50_000
     assert port.in_waiting == 4096
@@ -102,7 +102,7 @@ def test_resetting_empties_the_buffer(ticker, time):
     assert port.in_waiting == 0
 
 
-def test_wrong_speed_garbles_both_ways(ticker, time):
+def test_a_wrong_baud_rate_garbles_both_directions(ticker, time):
     port = FakeSerialPort(ticker, time, line_xor=0xFF)
     port.write(b"C")
     time.now = 10
@@ -110,7 +110,7 @@ def test_wrong_speed_garbles_both_ways(ticker, time):
     assert port.read(1) == bytes((ord("x") ^ 0xFF,))
 
 
-def test_link_sees_no_descriptor(ticker, time):
+def test_a_simulated_port_has_no_descriptor(ticker, time):
     assert SerialLink(FakeSerialPort(ticker, time)).fileno() == -1
 
 
@@ -123,7 +123,7 @@ def test_unplugging_breaks_the_link(ticker, time):
     link.close()
 
 
-def test_a_closed_port_refuses_and_keeps_nothing(ticker, time):
+def test_a_closed_port_refuses_and_discards_bytes(ticker, time):
     port = FakeSerialPort(ticker, time)
     port.close()
     port.close()

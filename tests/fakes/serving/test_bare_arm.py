@@ -66,7 +66,7 @@ def serve(tmp_path):
 
 
 @pytest.mark.slow
-def test_four_joints_arrive_under_the_programs_own_control(serve):
+def test_a_four_joint_arm_reaches_its_goal_under_vendor_control(serve):
     arm = serve()
     arm.activate()
     found = arm.client.move(WANTED, MOVE)
@@ -76,14 +76,14 @@ def test_four_joints_arrive_under_the_programs_own_control(serve):
 
 
 @pytest.mark.slow
-def test_a_person_who_carries_the_foot_is_in_the_way(serve):
+def test_a_person_carrying_the_foot_blocks_the_arm(serve):
     arm = serve(tool=TOOL, has_hand=True)
     arm.activate()
     found = arm.client.move(WANTED, MOVE)
     assert np.abs(np.subtract(found, TARGET)[:4]).max() > ARRIVED
 
 
-def test_a_bare_arm_falls_when_nothing_holds_it(serve):
+def test_an_unsupported_bare_arm_falls(serve):
     arm = serve()
     arm.activate()
     held = arm.client.move(WANTED, MOVE)
@@ -110,14 +110,14 @@ def test_a_bare_arm_that_was_active_sinks_when_it_is_idle_again(serve):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_program_weighs_the_arm_as_its_makers_do(seed):
+def test_gravity_torques_agree_with_the_vendor(seed):
     rng = np.random.default_rng(seed)
     q = rng.uniform(CONSTANTS.q_lower, CONSTANTS.q_upper)
     expected = ArmModel(CONSTANTS).gravity(q)
     assert holding_torques(q.tolist()) == pytest.approx(expected, abs=0.01)
 
 
-def test_the_program_knows_gears_and_units():
+def test_gears_and_units_agree_with_the_vendor():
     assert joints(HOME) == pytest.approx(HOME_Q, abs=1e-3)
     # The example of the protocol's description, floored.
     units = motor_units([1.0, -15.0, 2.0, 5.0, 0.3, -0.2, 0.05])

@@ -69,7 +69,7 @@ def serve(hosts, clock, **options):
     return PuckServer(network, motors, hosts, clock), motors
 
 
-def test_an_answer_leaves_within_a_millisecond(hosts, clock):
+def test_a_reply_leaves_in_time(hosts, clock):
     server, _ = serve(hosts, clock)
     hosts.coming.append((1, b"\x05"))
     begin_ns = clock.t_ns
@@ -79,7 +79,7 @@ def test_an_answer_leaves_within_a_millisecond(hosts, clock):
     assert hosts.gone == [(0x426, b"\x85\x00\x02\x00")]
 
 
-def test_answers_leave_one_after_the_other_as_on_a_wire(hosts, clock):
+def test_replies_leave_sequentially_as_on_a_wire(hosts, clock):
     server, _ = serve(hosts, clock, has_sensor=True)
     hosts.coming += [(0x404, b"\x30"), (8, b"\x36")]
     begin_ns = clock.t_ns
@@ -114,7 +114,7 @@ def test_every_frame_of_the_bus_is_tapped(hosts, clock):
     assert heard == [1, 0x426]
 
 
-def test_a_host_that_falls_silent_loses_an_active_arm(hosts, clock):
+def test_a_silent_host_loses_an_active_arm(hosts, clock):
     server, _ = serve(hosts, clock)
     server.press("activate")
     let_pass(server, clock, 120 * MS)  # the heartbeat's limit is 100 ms
@@ -129,14 +129,14 @@ def test_a_stall_of_the_server_is_no_lost_heartbeat(hosts, clock):
     assert server.state == "active"
 
 
-def test_the_arm_keeps_up_with_time_though_nobody_asks(hosts, clock):
+def test_the_arm_advances_without_requests(hosts, clock):
     server, motors = serve(hosts, clock)
     for _ in range(50):
         server.step()
     assert clock.t_ns - motors.t_ns <= 2 * MS
 
 
-def test_what_was_not_carried_is_told(hosts, clock):
+def test_uncarried_frames_are_reported(hosts, clock):
     server, _ = serve(hosts, clock)
     assert server.losses == ""
     hosts.lost = 3
@@ -151,7 +151,7 @@ def carried_arm():
     return arm
 
 
-def test_an_arm_under_no_torque_is_carried():
+def test_an_arm_without_torque_is_supported():
     arm = carried_arm()
     arm.set_torques([0] * 7)
     assert arm.is_held
@@ -159,7 +159,7 @@ def test_an_arm_under_no_torque_is_carried():
     assert not arm.is_held
 
 
-def test_an_arm_without_power_is_carried():
+def test_an_arm_without_power_is_supported():
     arm = carried_arm()
     arm.set_torques([5] * 7)
     arm.short_windings([True] * 7)
@@ -169,7 +169,9 @@ def test_an_arm_without_power_is_carried():
 @pytest.mark.parametrize(
     ("is_idle_first", "state"), [(True, "idle"), (False, "e-stop")]
 )
-def test_the_served_arm_starts_as_asked(hosts, clock, is_idle_first, state):
+def test_the_served_arm_starts_in_the_requested_pose(
+    hosts, clock, is_idle_first, state
+):
     server = build_home_server(hosts, HomePose(TOOL, FRAME, None, is_idle_first), clock)
     assert server.state == state
     hosts.coming += [(1, b"\x05"), (8, b"\x05"), (10, b"\x2a")]
@@ -207,7 +209,7 @@ def test_a_port_on_another_bus_ignores_frames_of_other_kinds():
     port.close()
 
 
-def test_a_port_whose_bus_broke_says_so():
+def test_a_port_with_a_broken_bus_reports_it():
     port = CanPort("virtual", "broken", 1_000_000)
     port.close()
     with pytest.raises(LinkError, match="virtual:broken broke"):

@@ -37,14 +37,14 @@ def order(arm, line, seconds):
     arm.rest(round(1e9 * seconds))
 
 
-def test_hands_pose_the_arm_as_its_client_reads_it(serve):
+def test_hands_pose_the_arm_as_read_by_its_client(serve):
     arm = serve(has_hand=True)
     order(arm, "pose 0.3 -1.8 0.1 2.9 0.2 0.8 0.1 1", 1.5)
     found = arm.client.read_joints()
     assert found == pytest.approx([0.3, -1.8, 0.1, 2.9, 0.2, 0.8, 0.1], abs=5e-3)
 
 
-def test_a_stop_is_where_the_joint_ends(serve):
+def test_a_joint_ends_at_its_stop(serve):
     arm = serve(has_hand=True, is_at_rest=True)
     order(arm, "stop 6 high", 1.0)
     # It was zeroed at rest, which its client takes for home.
@@ -54,7 +54,7 @@ def test_a_stop_is_where_the_joint_ends(serve):
     assert arm.client.read_joints()[5] == pytest.approx(HOME_Q[5] - REST_6, abs=0.01)
 
 
-def test_released_the_arm_stays_where_a_person_bears_it(serve):
+def test_a_released_arm_stays_while_supported(serve):
     arm = serve(has_hand=True)
     order(arm, "pose 0.3 -1.8 0 2.9 0 0.8 0 1", 1.3)
     order(arm, "release", 0.5)
@@ -67,7 +67,7 @@ def load(arm):
 
 
 @pytest.mark.parametrize("mount", [(0.0, 0.0, 0.0), (90.0, 0.0, 0.0)])
-def test_a_hung_weight_pulls_truly_down(serve, mount):
+def test_a_hung_weight_pulls_vertically(serve, mount):
     departure = RigDeviation(mount=np.radians(mount))
     arm = serve(has_hand=True, departure=departure)
     order(arm, "pose 0 -1.8 0 2.9 0 0.8 0 1", 1.4)
@@ -80,7 +80,7 @@ def test_a_hung_weight_pulls_truly_down(serve, mount):
     assert load(arm)[0] == pytest.approx(free, abs=0.05)
 
 
-def test_a_sound_arm_is_zeroed_where_its_zeros_are_off(serve):
+def test_a_sound_arm_is_zeroed_despite_offset_zeros(serve):
     sound = draw_sound_rig(2)
     arm = serve(has_hand=True, departure=sound)
     wanted = np.array([0.3, -1.8, 0.1, 2.9, 0.2, 0.8, 0.1])
@@ -90,7 +90,7 @@ def test_a_sound_arm_is_zeroed_where_its_zeros_are_off(serve):
     assert off[free] == pytest.approx(sound.zeros[free], abs=5e-3)
 
 
-def test_a_wrong_arm_is_served_wrong(serve):
+def test_a_wrong_rig_is_served_with_its_deviation(serve):
     departure = wrong_rig("encoder-4-reversed").departure
     arm = serve(has_hand=True, departure=departure)
     order(arm, "pose 0 -1.8 0 2.9 0 0.8 0 1", 1.4)

@@ -150,20 +150,20 @@ def arm(tmp_path):
 
 
 @pytest.mark.parametrize("name", LIES)
-def test_a_strict_host_notices_a_network_that_is_wrong(name, arm):
+def test_a_strict_host_detects_a_wrong_network(name, arm):
     lie, words = LIES[name]
     client = StrictClient(LyingBus(arm.bus, lie), arm.rest, has_sensor=True)
     with pytest.raises(DeviationError, match=words):
         drive(client, arm.press, cycles=2)
 
 
-def test_a_bus_that_tells_no_lie_is_believed(arm):
+def test_a_truthful_bus_is_accepted(arm):
     bus = LyingBus(arm.bus, lambda _, frame, is_of_host: [] if is_of_host else [frame])
     client = StrictClient(bus, arm.rest, has_sensor=True)
     drive(client, arm.press, cycles=2)
     assert client.vers == 200
 
 
-def test_a_sensor_nobody_told_of_is_a_deviation(arm):
+def test_an_undeclared_sensor_is_a_deviation(arm):
     with pytest.raises(DeviationError, match="found nodes"):
         StrictClient(arm.bus, arm.rest, has_sensor=False).start()

@@ -130,7 +130,7 @@ def test_the_foot_presses_with_the_weight_of_the_virtual_mass(build):
     assert np.mean(forces) == pytest.approx(mass * 9.81, abs=0.05)
 
 
-def test_joint_7_gives_way_by_no_more_than_12_mrad(build):
+def test_joint_7_deflects_within_its_limit(build):
     loop = build(POSES[0])
     loop.start(ArmState.HOLD)
     loop.step(500, is_commanded=True)
@@ -141,7 +141,7 @@ def test_joint_7_gives_way_by_no_more_than_12_mrad(build):
     assert 0.005 < moved <= 0.012
 
 
-def test_the_arm_goes_where_it_is_sent(build):
+def test_the_arm_reaches_its_goal(build):
     loop = build(POSES[0])
     loop.start(ArmState.HOLD)
     loop.step(100, is_commanded=True)

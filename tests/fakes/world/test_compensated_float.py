@@ -61,7 +61,7 @@ def every(cases, *daily):
     ("joint", "late"),
     every(product(range(6), (0, 2)), *product((0, 1, 3, 5), (2,)), (1, 0)),
 )
-def test_an_overestimate_of_a_fifth_leaves_no_swing(joint, late):
+def test_overestimated_friction_causes_no_oscillation(joint, late):
     motors = whole()
     q = settled(motors, over(motors, 1.2), joint=joint, late=late)
     assert np.ptp(q, axis=0)[:6].max() < STILL
@@ -71,14 +71,14 @@ def test_an_overestimate_of_a_fifth_leaves_no_swing(joint, late):
     ("joint", "presliding"),
     every(product((1, 3, 5), (0.25, 0.5, 2.0, 4.0)), (1, 0.25), (3, 4.0), (5, 0.25)),
 )
-def test_bristles_that_are_softer_or_stiffer_leave_no_swing(joint, presliding):
+def test_wrong_bristle_stiffness_causes_no_oscillation(joint, presliding):
     motors = whole(presliding=presliding)
     q = settled(motors, over(motors, 1.2), joint=joint, late=2)
     assert np.ptp(q, axis=0)[:6].max() < STILL
 
 
 @pytest.mark.parametrize("joint", [1, 3])
-def test_a_person_who_holds_the_arm_feels_no_swing(joint):
+def test_a_held_arm_does_not_oscillate(joint):
     motors = whole()
     q = settled(motors, over(motors, 1.2), joint=joint, grip="stiff")
     assert np.ptp(q, axis=0)[:6].max() < 5 * STILL
@@ -94,7 +94,7 @@ def test_a_person_who_holds_the_arm_feels_no_swing(joint):
         (8.0, 3, "stiff"),
     ),
 )
-def test_cables_that_give_way_leave_no_swing(cables, joint, grip):
+def test_elastic_cables_cause_no_oscillation(cables, joint, grip):
     motors = whole()
     known = over(motors, 1.2)
     q = settled(motors, known, joint=joint, grip=grip, cables=cables, late=2)

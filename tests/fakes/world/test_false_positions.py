@@ -101,7 +101,7 @@ def plausible(motor):
 
 @pytest.mark.parametrize("state", [ArmState.FLOAT, ArmState.HOLD])
 @pytest.mark.parametrize("motor", range(1, 8))
-def test_one_false_position_is_no_blow(motor, state):
+def test_one_rejected_position_gives_no_torque_step(motor, state):
     bench = Bench(state)
     for share in (0.3, -0.6, 0.9, -1.0, 1.1, 5.0):
         bench.lie = (motor, round(share * plausible(motor)))

@@ -48,7 +48,7 @@ def late_arm(state, friction, late_ms, twist=0.0, seconds=1.0):
 @pytest.mark.parametrize("late_ms", [2.0, 6.6, 12.6, 18.6, 50.0])
 @pytest.mark.parametrize("state", [ArmState.FLOAT, ArmState.HOLD])
 @pytest.mark.parametrize("friction", [0.02, pytest.param(0.4, marks=pytest.mark.slow)])
-def test_lateness_that_lasts_idles_an_arm_that_stays_slow(friction, state, late_ms):
+def test_lasting_lateness_idles_the_arm_while_slow(friction, state, late_ms):
     worst, faults, idle_ms = late_arm(state, friction, late_ms)
     assert worst <= 1.0
     assert Fault.LOOP_LOST in faults
@@ -64,6 +64,6 @@ def test_no_lateness_makes_the_lock_of_joint_7_unstable(late_ms):
             assert late_arm(state, friction, late_ms, seconds=0.5)[0] <= 1.0
 
 
-def test_a_twisted_foot_is_held_as_far_as_a_slow_loop_can():
+def test_a_twisted_foot_is_held_within_slow_loop_limits():
     worst, _, _ = late_arm(ArmState.FLOAT, 0.02, 6.6, twist=0.1)
     assert worst <= 0.5

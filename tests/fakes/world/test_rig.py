@@ -70,7 +70,7 @@ def test_the_same_seed_gives_the_same_rig_and_another_does_not():
     assert all(a != b for a, b in zip(one[::2], two[::2], strict=True))
 
 
-def test_every_trial_is_raked_anew_and_again_the_same(rig_and_clock):
+def test_every_trial_has_its_own_reproducible_ground(rig_and_clock):
     rig, _ = rig_and_clock
     hand = LocalSimulation(rig)
 
@@ -98,7 +98,7 @@ def pushed(trials, pace=None):
     return truth["hand_force"].tobytes(), truth["contact_force"].tobytes()
 
 
-def test_ground_and_hand_repeat_themselves_whatever_was_before():
+def test_ground_and_hand_are_reproducible_in_any_order():
     assert pushed([2]) == pushed([1, 3, 2])
     assert pushed([2])[0] != pushed([3])[0]
 
@@ -138,7 +138,7 @@ def test_the_pendant_is_pressed_through_the_rehearsal(rig_and_clock):
     assert rig.network.safety_mode is SafetyMode.E_STOP
 
 
-def test_the_hand_does_what_the_rehearsal_says(rig_and_clock):
+def test_the_hand_follows_the_rehearsal(rig_and_clock):
     rig, clock = rig_and_clock
     hand = LocalSimulation(rig)
     hand.lift()
@@ -150,7 +150,7 @@ def test_the_hand_does_what_the_rehearsal_says(rig_and_clock):
 
 
 @pytest.mark.parametrize("fault", ["ft-silent", "ft-stale"])
-def test_a_silent_sensor_says_nothing_until_it_is_mended(rig_and_clock, fault):
+def test_a_silent_sensor_sends_nothing_until_repaired(rig_and_clock, fault):
     rig, clock = rig_and_clock
     port = rig.open_port()
     hand = LocalSimulation(rig)
@@ -184,7 +184,7 @@ def ask_wrench(rig, clock):
     return *decode_force(force.data), *decode_torque(torque.data)[0]
 
 
-def test_a_sensor_on_the_bus_feels_what_the_plant_says(rig_with_sensor_on_bus):
+def test_a_sensor_on_the_bus_reads_the_plants_load(rig_with_sensor_on_bus):
     rig, clock = rig_with_sensor_on_bus
     felt = np.mean([ask_wrench(rig, clock) for _ in range(200)], axis=0)
     true = rig.plant.sensor_load(clock.now_ns())
@@ -213,7 +213,7 @@ def test_every_known_fault_can_be_injected(rig_and_clock):
     assert rig.network.safety_mode is SafetyMode.E_STOP  # the last one stays
 
 
-def test_true_forces_are_told_in_the_frame_of_the_base(rig_and_clock):
+def test_true_forces_are_in_the_base_frame(rig_and_clock):
     rig, clock = rig_and_clock
     hand = LocalSimulation(rig)
     hand.push()
@@ -227,7 +227,7 @@ def test_true_forces_are_told_in_the_frame_of_the_base(rig_and_clock):
     assert len(hand.take_truth()) == 0
 
 
-def test_parameters_of_the_ground_are_told_as_text(rig_and_clock):
+def test_ground_parameters_are_listed_as_text(rig_and_clock):
     rig, _ = rig_and_clock
     parameters = LocalSimulation(rig).parameters()
     assert float(parameters["d50"]) == 0.019
@@ -237,13 +237,13 @@ def test_parameters_of_the_ground_are_told_as_text(rig_and_clock):
 # --- randomness -----------------------------------------------------------------------
 
 
-def test_a_stream_hands_out_what_its_generator_draws_across_its_blocks():
+def test_a_buffered_stream_equals_its_generator():
     normals = NormalStream(np.random.default_rng(1), block=3)
     drawn = np.random.default_rng(1).standard_normal(9).tolist()
     assert [normals.next() for _ in range(9)] == drawn
 
 
-def test_numbers_drawn_ahead_leave_the_generator_to_others_where_it_would_be():
+def test_buffering_does_not_disturb_a_shared_generator():
     ahead, plain = np.random.default_rng(3), np.random.default_rng(3)
     uniforms = UniformStream(ahead, block=4)
     for count in (1, 0, 4, 7):  # within a block, none, all of it, across two
@@ -255,7 +255,7 @@ def test_numbers_drawn_ahead_leave_the_generator_to_others_where_it_would_be():
         assert ahead.gamma(2.0) == plain.gamma(2.0)
 
 
-def test_an_ornstein_uhlenbeck_process_has_its_spread_and_memory():
+def test_an_ornstein_uhlenbeck_process_has_its_spread_and_correlation():
     normals = NormalStream(np.random.default_rng(1))
     process = OrnsteinUhlenbeck(2.0, 0.1, 0.01, normals)
     x = np.array([process.step() for _ in range(40_000)])
@@ -264,7 +264,7 @@ def test_an_ornstein_uhlenbeck_process_has_its_spread_and_memory():
     assert lag == pytest.approx(np.exp(-1.0), abs=0.05)
 
 
-def test_tremor_has_unit_strength_at_nine_and_a_half_hertz():
+def test_tremor_has_unit_strength_at_its_frequency():
     tremor = Tremor(0.0005, NormalStream(np.random.default_rng(1)))
     x = np.array([tremor.step() for _ in range(60_000)])
     assert x.std() == pytest.approx(1.0, rel=0.15)
@@ -273,7 +273,7 @@ def test_tremor_has_unit_strength_at_nine_and_a_half_hertz():
     assert 8.0 < np.average(frequency, weights=spectrum) < 12.0
 
 
-def test_ground_hand_and_sensor_of_a_trial_do_not_wait_for_each_other():
+def test_ground_hand_and_sensor_generators_are_independent():
     alone = trial_generators(1, "S0", 1).hand.random(5).tolist()
     shared = trial_generators(1, "S0", 1)
     shared.ground.random(100)
@@ -292,6 +292,6 @@ def test_trials_of_other_terrains_or_numbers_have_other_generators():
     assert trial_generator(1, "S0", 1).random() in draws
 
 
-def test_the_commands_offer_the_paces_and_the_cables_of_the_simulation():
+def test_commands_offer_the_paces_and_cables_of_the_simulation():
     assert tuple(PACES) == arguments.PACES
     assert (CABLES.low, CABLES.high) == arguments.CABLES

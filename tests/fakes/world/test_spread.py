@@ -54,13 +54,13 @@ def test_sound_rigs_spread_as_stated(quantity, scale):
     assert abs(np.mean(values)) < 0.2 * scale
 
 
-def test_scales_are_those_of_the_plan():
+def test_spread_scales_agree_with_the_plan():
     degrees = np.degrees([ZEROS, STOPS, TILT, AXES])
     assert degrees == pytest.approx([0.3, 0.7, 0.3, 0.5])
     assert (GAINS, MASS, CENTRE, CABLE) == (0.005, 0.005, 1e-3, 0.08)
 
 
-def test_nothing_but_what_is_stated_differs():
+def test_only_stated_properties_differ():
     rig, plain = DRAWN[3], RigDeviation()
     assert rig.mount[2] == 0.0
     for same in ("ratios", "links", "sole", "torque", "counts"):
@@ -89,7 +89,7 @@ def spread_rig(departure):
     return rig
 
 
-def test_a_rig_without_a_departure_is_the_one_of_the_drawings():
+def test_a_rig_without_departures_is_nominal():
     rig, _ = make_rig(5)
     assert rig.plant.wiring is None
     assert (rig.plant.ends.lower == CONSTANTS.q_lower).all()
@@ -109,7 +109,7 @@ def test_ground_hand_and_friction_of_a_seed_stay_when_it_is_spread():
         rig.bus.shutdown()
 
 
-def test_positions_are_off_by_the_zeros_and_stops_by_their_own():
+def test_zeros_offset_positions_and_stops_have_their_own_offset():
     sound = draw_sound_rig(5)
     rig = spread_rig(sound)
     turns = 2.0 * np.pi / np.array(CONSTANTS.cts)
@@ -121,7 +121,7 @@ def test_positions_are_off_by_the_zeros_and_stops_by_their_own():
     rig.bus.shutdown()
 
 
-def test_what_is_true_of_a_rig_adds_up():
+def test_the_truth_of_a_rig_is_consistent():
     one = RigDeviation(zeros=np.full(7, 0.1), foot_mass=1.1, friction=2.0)
     other = RigDeviation(zeros=np.full(7, 0.2), foot_mass=0.5, torn=2)
     both = other.on(one)
@@ -129,19 +129,19 @@ def test_what_is_true_of_a_rig_adds_up():
     assert (both.foot_mass, both.friction, both.torn) == (0.55, 2.0, 2)
 
 
-def test_a_base_that_is_turned_about_y_lets_gravity_point_elsewhere():
+def test_a_base_turned_about_y_changes_the_gravity_direction():
     turned = RigDeviation(mount=np.radians([0.0, 90.0, 0.0]))
     down = true_options(PlantOptions(), turned).down
     # Its z axis lies along the true x: what is down is its own -z turned back.
     assert down == pytest.approx((1.0, 0.0, 0.0), abs=1e-12)
 
 
-def test_axes_of_a_sensor_show_a_turned_load():
+def test_a_turned_sensor_reads_a_turned_load():
     shown = rotated_axes([0.0, 0.0, np.pi / 2]) @ [1.0, 0.0, 3.0, 0.0, 2.0, 0.0]
     assert shown == pytest.approx([0.0, -1.0, 3.0, 2.0, 0.0, 0.0], abs=1e-12)
 
 
-def test_foot_and_links_are_as_heavy_as_stated():
+def test_foot_and_links_have_their_stated_mass():
     departure = RigDeviation(foot_mass=2.0, links=np.array([0.0, 0, 1, 0, 0, 0, 0]))
     assert true_tool(TOOL, departure).foot.mass == 2.0 * TOOL.foot.mass
     links = true_constants(CONSTANTS, departure).links

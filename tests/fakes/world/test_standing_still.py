@@ -24,7 +24,7 @@ STOPPING = (0.10, 0.12, 0.05, 0.13, 0.08, 0.06)  # rad
 
 @pytest.mark.parametrize("friction", FRICTION)
 @pytest.mark.parametrize("error", [0.6, -0.4])
-def test_a_wrong_mass_of_the_foot_moves_no_joint_far_and_none_for_long(friction, error):
+def test_a_wrong_foot_mass_moves_joints_little_and_briefly(friction, error):
     bench = HoldBench(friction=friction, error=error)
     q = bench.run(3.0)
     assert np.abs(q - bench.braked_q).max() < DRIFT
@@ -33,7 +33,7 @@ def test_a_wrong_mass_of_the_foot_moves_no_joint_far_and_none_for_long(friction,
 
 @pytest.mark.parametrize("friction", FRICTION)
 @pytest.mark.parametrize("torque", [4.0, -4.0])
-def test_four_newton_metres_at_joint_2_are_held(friction, torque):
+def test_a_moderate_torque_at_joint_2_is_held(friction, torque):
     bench = HoldBench(friction=friction)
     q = bench.push(1, torque, 3.0)
     assert np.abs(q - bench.braked_q).max() < DRIFT
@@ -54,7 +54,7 @@ def test_an_arm_that_is_pushed_away_stays_where_it_is_left(friction, joint):
 
 
 @pytest.mark.parametrize("joint", range(6))
-def test_who_pushes_slowly_meets_no_more_than_the_limit(joint):
+def test_a_slow_push_meets_at_most_the_limit(joint):
     bench = HoldBench()
     bench.sent.clear()
     bench.push(joint, 1.15 * TORQUE_LIMIT[joint], 1.0)
@@ -85,7 +85,7 @@ def test_a_joint_that_was_fast_is_stopped_within_bounds(joint):
 
 
 @pytest.mark.parametrize("joint", [0, 1])
-def test_a_joint_that_moves_the_whole_arm_at_its_limit_is_no_push(joint):
+def test_steady_motion_at_the_limit_is_not_a_push(joint):
     bench = thrown(joint, 0.9)
     assert bench.cycle.status.verdict.fault is Fault.KINETIC_ENERGY
     assert bench.plant.is_idle
@@ -99,7 +99,7 @@ def thrown(joint, share):
     return bench
 
 
-def test_hold_begins_without_a_step_of_torque_in_an_arm_that_stands():
+def test_hold_of_an_arm_at_rest_begins_without_a_torque_step():
     bench = HoldBench(friction=1.0)
     bench.enter(ArmState.FLOAT)
     bench.plant.q[0] += 1.8e-5  # half a count: at 0 the encoder flickers
@@ -111,7 +111,7 @@ def test_hold_begins_without_a_step_of_torque_in_an_arm_that_stands():
 
 
 @pytest.mark.parametrize("joint", range(6))
-def test_what_a_blow_leaves_behind_decays_in_drives_without_friction(joint):
+def test_motion_after_a_blow_decays_without_drive_friction(joint):
     bench = HoldBench(friction=0.0)
     bench.run(0.5)
     bench.plant.qd[joint] = 0.1 if joint < 4 else 0.5
@@ -121,7 +121,7 @@ def test_what_a_blow_leaves_behind_decays_in_drives_without_friction(joint):
     assert last.max() < 0.1 * first[joint]
 
 
-def test_hold_that_is_asked_for_again_and_again_lets_nothing_creep():
+def test_repeated_hold_requests_cause_no_creep():
     bench = HoldBench(error=0.6)
     for _ in range(50):
         bench.enter(ArmState.HOLD)
@@ -129,14 +129,14 @@ def test_hold_that_is_asked_for_again_and_again_lets_nothing_creep():
     assert np.abs(q[-1] - bench.braked_q).max() < DRIFT
 
 
-def test_damp_after_hold_keeps_the_place():
+def test_damp_after_hold_keeps_the_pose():
     bench = HoldBench(error=0.6)
     bench.enter(ArmState.DAMP)
     q = bench.run(2.0)
     assert np.abs(q - bench.braked_q).max() < DRIFT
 
 
-def test_an_arm_that_is_guided_follows_a_hand_and_stays_where_it_is_left():
+def test_a_guided_arm_follows_a_hand_and_stays_where_left():
     bench = HoldBench()
     bench.enter(ArmState.GUIDE)
     carried = bench.push(1, -9.0, 1.0)[:, 1]
@@ -148,7 +148,7 @@ def test_an_arm_that_is_guided_follows_a_hand_and_stays_where_it_is_left():
 
 @pytest.mark.parametrize("friction", FRICTION)
 @pytest.mark.parametrize("error", [0.6, -0.4])
-def test_an_arm_that_is_guided_by_nobody_stands(friction, error):
+def test_a_guided_arm_without_a_hand_stays_at_rest(friction, error):
     bench = HoldBench(friction=friction, error=error)
     bench.enter(ArmState.GUIDE)
     q = bench.run(3.0)

@@ -134,7 +134,7 @@ def test_the_stop_button_ends_a_move_for_good():
 
 
 @pytest.mark.parametrize("fault", WITHOUT_DETAIL)
-def test_a_verdict_of_those_around_the_loop_stops_a_move(fault):
+def test_an_external_verdict_stops_a_move(fault):
     bench = HoldBench()
     move(bench)
     begin = bench.plant.q.copy()
@@ -143,7 +143,7 @@ def test_a_verdict_of_those_around_the_loop_stops_a_move(fault):
     assert bench.cycle.status.verdict.fault is fault
 
 
-def test_a_move_that_was_stopped_does_not_go_on_when_the_fault_is_over():
+def test_a_stopped_move_does_not_resume_after_the_fault():
     bench = HoldBench()
     goal = move(bench)
     bench.cycle.limits = replace(LIMITS, speed=(0.45,) * 7)
@@ -169,14 +169,14 @@ def test_no_move_begins_while_a_verdict_stands():
     assert np.abs(bench.plant.q - goal).max() < 0.02
 
 
-def test_a_move_that_was_not_begun_is_forgotten_when_hold_is_asked_for():
+def test_a_pending_move_is_discarded_by_a_hold_request():
     bench = HoldBench()
     bench.cycle.move_to((bench.plant.q + WAY).tolist(), SPEED)
     bench.cycle.request(ArmState.HOLD)
     assert np.ptp(bench.run(0.5), axis=0).max() < STILL
 
 
-def test_the_torque_makes_no_step_when_a_person_stops_a_move_at_rest():
+def test_stopping_a_move_at_rest_causes_no_torque_step():
     bench = HoldBench(error=0.6)
     bench.cycle.move_to((bench.plant.q + 0.02).tolist(), 0.1)
     bench.run(1.5)  # there, and held against a wrong weight
@@ -214,7 +214,7 @@ FROZEN = [
 
 
 @pytest.mark.parametrize(("friction", "motor"), FROZEN)
-def test_a_motor_whose_encoder_freezes_in_a_move_is_noticed(friction, motor):
+def test_an_encoder_that_freezes_in_a_move_is_detected(friction, motor):
     bench = HoldBench(friction=friction)
     move(bench)
     freeze(bench, motor)
@@ -224,7 +224,7 @@ def test_a_motor_whose_encoder_freezes_in_a_move_is_noticed(friction, motor):
 
 
 @pytest.mark.parametrize(("friction", "motor"), [*FROZEN, (0.02, 7), (1.0, 7)])
-def test_a_motor_whose_encoder_is_frozen_before_a_move_is_noticed(friction, motor):
+def test_an_encoder_frozen_before_a_move_is_detected(friction, motor):
     bench = HoldBench(friction=friction)
     freeze(bench, motor)
     bench.cycle.move_to((bench.plant.q + WAY).tolist(), SPEED)
@@ -234,7 +234,7 @@ def test_a_motor_whose_encoder_is_frozen_before_a_move_is_noticed(friction, moto
 
 @pytest.mark.parametrize("error", [-0.3, 0.3])
 @pytest.mark.parametrize("friction", [0.02, 0.3, 1.0])
-def test_a_sound_arm_goes_to_and_fro_whatever_its_friction_and_weight(friction, error):
+def test_a_sound_arm_completes_moves_with_any_friction_and_weight(friction, error):
     bench = HoldBench(friction=friction, error=error)
     begin = bench.plant.q.copy()
     for goal, speed in ((WAY, 0.5), (0.0 * WAY, 0.05), (0.1 * WAY, 0.05), (0.0, 0.5)):
@@ -243,7 +243,7 @@ def test_a_sound_arm_goes_to_and_fro_whatever_its_friction_and_weight(friction, 
         assert bench.cycle.status.verdict is None
 
 
-def test_joint_7_is_turned_at_its_top_speed_and_frozen_there_is_braked():
+def test_joint_7_frozen_at_its_top_speed_is_braked():
     bench = HoldBench()
     bench.cycle.move_to((bench.plant.q + WAY).tolist(), SPEED)
     bench.run(0.8)
@@ -253,7 +253,7 @@ def test_joint_7_is_turned_at_its_top_speed_and_frozen_there_is_braked():
     assert bench.cycle.status.verdict.detail == StuckMotor(7)
 
 
-def test_a_hand_that_holds_the_arm_in_a_move_has_it_braked():
+def test_holding_the_arm_in_a_move_brakes_it():
     """What does not turn is not told from what is held."""
     bench = HoldBench()
     move(bench)

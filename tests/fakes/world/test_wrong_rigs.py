@@ -90,20 +90,20 @@ def believed(plant: ArmPlant):
     return np.linalg.solve(CONSTANTS.j2mp, TURNS * np.array(plant.counts()))
 
 
-def test_no_name_stands_in_the_catalogue_twice_and_every_rig_has_its_words():
+def test_catalogue_names_are_unique_and_every_rig_is_described():
     rigs = catalogue()
     assert all(rig.wrong and rig.cause for rig in rigs.values())
     assert len({rig.wrong for rig in rigs.values()}) == len(rigs)
 
 
-def test_a_name_that_there_is_not_is_refused_with_the_nearest():
+def test_an_unknown_name_is_refused_with_the_nearest():
     with pytest.raises(SettingsError, match="motor-9") as caught:
         wrong_rig("motor-9-reversed")
     assert "Did you mean motor-" in str(caught.value.hint)
     assert [*wrong_rigs()] == [*catalogue()]
 
 
-def test_the_sound_rig_tells_the_truth(build):
+def test_the_sound_rig_has_no_deviation(build):
     plant = build("").plant
     plant.q = NEAR_HOME
     assert believed(plant) == pytest.approx(NEAR_HOME, abs=2e-4)
@@ -117,7 +117,7 @@ SAID = [
 
 
 @pytest.mark.parametrize(("name", "node", "prop", "value"), SAID)
-def test_pucks_say_what_they_are_named_for(build, name, node, prop, value):
+def test_wrong_pucks_report_the_named_deviation(build, name, node, prop, value):
     assert get(build(name), node, prop) == [value]
     assert get(build(""), node, prop) != [value]
 
@@ -128,7 +128,7 @@ def test_a_puck_of_other_firmware_has_its_numbers(build):
     assert versions == [[200], [200], [60], [200], [200], [200], [200]]
 
 
-def test_a_silent_puck_says_nothing(build):
+def test_a_silent_puck_sends_nothing(build):
     rig = build("puck-4-silent")
     assert {node for _, node, _ in ask(rig)} == set(MOTOR_NODES) - {4}
     assert get(rig, 4, "STAT") == []
@@ -144,14 +144,14 @@ TORQUES = [
 
 
 @pytest.mark.parametrize(("name", "made"), TORQUES)
-def test_motors_make_what_they_are_named_for(build, name, made):
+def test_wrong_motors_have_the_named_deviation(build, name, made):
     rig = build(name)
     asked = [100 * node for node in MOTOR_NODES]
     wanted = [100 * made.get(node, node) for node in MOTOR_NODES]
     assert rig.plant.wiring.applied_torques(asked) == pytest.approx(wanted, abs=0.5)
 
 
-def test_a_reversed_encoder_tells_the_way_back(build):
+def test_a_reversed_encoder_counts_backwards(build):
     plant = build("encoder-4-reversed").plant
     plant.q = CONSTANTS.home
     home = np.array(plant.counts())
@@ -162,7 +162,7 @@ def test_a_reversed_encoder_tells_the_way_back(build):
     assert told == pytest.approx(signs * true, abs=2.0)
 
 
-def test_swapped_encoders_tell_of_each_other(build):
+def test_swapped_encoders_report_each_others_motor(build):
     plant = build("encoders-6-7-swapped").plant
     plant.q = CONSTANTS.home
     home = np.array(plant.counts())
@@ -173,7 +173,7 @@ def test_swapped_encoders_tell_of_each_other(build):
     assert told == pytest.approx(true, abs=2.0)
 
 
-def test_behind_a_torn_cable_the_rotor_tells_no_way(build):
+def test_a_rotor_on_a_torn_cable_reports_no_motion(build):
     rig = build("cable-4-torn")
     before = rig.plant.counts()
     rig.plant.q = NEAR_HOME
@@ -182,14 +182,14 @@ def test_behind_a_torn_cable_the_rotor_tells_no_way(build):
     assert [n for n, still in enumerate(stands, 1) if still] == [4]
 
 
-def test_positions_are_off_by_what_the_zero_is(build):
+def test_a_wrong_zero_offsets_positions(build):
     plant = build("zero-2-off-10deg").plant
     plant.q = NEAR_HOME
     off = np.degrees(believed(plant) - NEAR_HOME)
     assert off == pytest.approx([0.0, -10.0, 0.0, 0.0, 0.0, 0.0, 0.0], abs=0.02)
 
 
-def test_travel_from_home_is_told_as_a_share(build):
+def test_travel_from_home_is_scaled(build):
     plant = build("wrist-9.48").plant
     plant.q = CONSTANTS.home
     assert believed(plant) == pytest.approx(CONSTANTS.home, abs=2e-4)
@@ -206,7 +206,7 @@ def test_travel_from_home_is_told_as_a_share(build):
         ("base-turned-90deg", (0.0, 0.0, -1.0)),
     ],
 )
-def test_gravity_pulls_where_the_base_is_mounted(build, name, down):
+def test_gravity_follows_the_mounting_of_the_base(build, name, down):
     rig = build(name)
     foot = TOOL.foot.mass * 9.81
     rotation = MODEL.sole_pose(rig.plant.q)[1]
@@ -214,7 +214,7 @@ def test_gravity_pulls_where_the_base_is_mounted(build, name, down):
     assert weight / foot == pytest.approx(down, abs=0.002)
 
 
-def test_a_turned_base_has_its_container_elsewhere():
+def test_a_turned_base_moves_the_container():
     frame = true_frame(FRAME, wrong_rig("base-turned-90deg").departure)
     assert frame.far_end == pytest.approx((0.0, -0.70, 0.12))
     assert frame.axes()[0] == pytest.approx([0.0, 1.0, 0.0], abs=1e-9)
@@ -229,18 +229,18 @@ SHOWN = [
 
 
 @pytest.mark.parametrize(("name", "shown"), SHOWN)
-def test_the_sensor_shows_another_load_than_it_bears(name, shown):
+def test_a_wrong_sensor_reports_another_load(name, shown):
     seen = sensor_reading(lambda _: LOAD, wrong_rig(name).departure)(0)
     assert seen == pytest.approx(shown, abs=6e-4)
 
 
-def test_a_foreign_matrix_mixes_the_axes():
+def test_a_wrong_calibration_matrix_mixes_the_axes():
     shown = wrong_rig("sensor-foreign-matrix").departure.shown
     assert 0.02 < np.abs(shown[:3, :3] - np.eye(3)).max() < 0.5
     assert np.linalg.matrix_rank(shown) == 6
 
 
-def test_a_late_sensor_shows_the_load_of_20_ms_ago():
+def test_a_late_sensor_shows_an_earlier_load():
     source = sensor_reading(
         lambda t_ns: [float(t_ns)] * 6, wrong_rig("sensor-20ms-late").departure
     )
@@ -258,7 +258,7 @@ def test_the_sensors_cable_pulls_at_the_foot(build):
     assert (pulled - free)[3:] == pytest.approx(np.zeros(3), abs=1e-3)
 
 
-def test_feet_are_what_they_are_named_for():
+def test_wrong_feet_have_the_named_deviation():
     def foot(name):
         return true_tool(TOOL, wrong_rig(name).departure)
 
@@ -268,21 +268,21 @@ def test_feet_are_what_they_are_named_for():
     assert foot("sole-20mm-lower").sole - TOOL.sole == pytest.approx([0, 0, 0.02])
 
 
-def test_a_foot_that_is_mistyped_is_in_the_settings():
+def test_a_mistyped_foot_is_wrong_in_the_settings():
     settings = load_settings(None)
     light = typed_wrongly(settings, "foot-forgotten")
     assert {foot.mass for foot in light.rig.feet.values()} == {0.05}
     assert typed_wrongly(settings, "foot-heavier") is settings
 
 
-def test_links_and_friction_are_what_they_are_named_for(build):
+def test_wrong_links_and_friction_have_the_named_deviation(build):
     heavy = true_constants(CONSTANTS, wrong_rig("load-on-elbow").departure)
     assert heavy.links[2].mass == pytest.approx(CONSTANTS.links[2].mass + 1.0)
     rubbing, sound = build("friction-threefold").plant, build("").plant
     assert rubbing.friction.coulomb == pytest.approx(3.0 * sound.friction.coulomb)
 
 
-def test_positions_come_too_late(build):
+def test_late_positions_arrive_late(build):
     usual = {node: t_ns for t_ns, node, _ in ask(build(""), 8 * MS)}
     found = {node: t_ns for t_ns, node, _ in ask(build("replies-a-cycle-late"), 8 * MS)}
     delays = [(found[node] - usual[node]) / MS for node in MOTOR_NODES]
@@ -295,7 +295,7 @@ def test_one_position_in_a_thousand_is_lost(build):
     assert 1 <= missing <= 18  # of 7000, 7 expected
 
 
-def test_a_node_that_is_there_twice_answers_twice(build):
+def test_a_duplicated_node_answers_twice(build):
     rig = build("duplicate-node")
     one, other = get(rig, 5, "SN")
     assert one != other
@@ -312,7 +312,7 @@ def test_another_program_is_on_the_bus(build):
     assert len(from_others) >= 27
 
 
-def test_a_dead_button_does_nothing(build):
+def test_a_dead_button_has_no_effect(build):
     rig, sound = build("stop-button-dead"), build("")
     for each in (rig, sound):
         each.network.pendant("activate")
@@ -331,7 +331,7 @@ def test_a_disobedient_module_stays_active(build):
     assert modes == [SafetyMode.ACTIVE, SafetyMode.IDLE]
 
 
-def test_a_module_waits_a_second_for_positions(build):
+def test_a_slow_module_has_a_longer_heartbeat_timeout(build):
     modes = []
     for name in ("heartbeat-1s", ""):
         rig = build(name)
@@ -343,7 +343,7 @@ def test_a_module_waits_a_second_for_positions(build):
     assert modes == [active, idle, idle, idle]
 
 
-def test_a_module_sets_twice_the_limit_it_is_told(build):
+def test_a_wrong_module_sets_another_limit(build):
     number = property_number(Device.SAFETY, "VL2", 200)
     read = []
     for name in ("vl2-doubled", ""):
@@ -353,7 +353,7 @@ def test_a_module_sets_twice_the_limit_it_is_told(build):
     assert read == [2000, 1000]
 
 
-def test_places_are_what_they_are_named_for():
+def test_wrong_places_have_the_named_deviation():
     def frame(name):
         return true_frame(replace(FRAME, incline=0.2), wrong_rig(name).departure)
 

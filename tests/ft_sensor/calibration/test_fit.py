@@ -43,7 +43,7 @@ def test_payload_bias_mounting_and_sign_are_recovered_exactly(angle_deg, sign):
     assert fit.residual < 1e-4
 
 
-def test_noise_of_two_second_means_leaves_the_accuracy_that_is_asked_for():
+def test_noise_leaves_the_required_accuracy():
     # 0.08 N white noise, averaged over 1600 samples, and a quantum of 0.05 N
     held, rotations = payload(20.0), orientations(12)
     shown = np.round(readings(held, rotations, noise=0.002) / 0.002) * 0.002
@@ -72,19 +72,19 @@ def test_a_clean_fit_is_accepted():
     assert fit.torque_residual < 1e-6
 
 
-def test_five_orientations_are_too_few():
+def test_too_few_orientations_are_refused():
     held, rotations = payload(), orientations(5)
     with pytest.raises(SettingsError, match="5 orientations were measured, 6"):
         fit_sensor(rotations, readings(held, rotations))
 
 
-def test_orientations_that_are_alike_are_refused():
+def test_similar_orientations_are_refused():
     rotations = np.repeat(orientations(1), 8, axis=0)
     with pytest.raises(SettingsError, match="too similar"):
         fit_sensor(rotations, readings(payload(), rotations))
 
 
-def test_a_tare_at_one_angle_is_wrong_on_an_incline_and_a_calibration_is_not():
+def test_on_an_incline_a_calibration_holds_where_a_tare_does_not():
     """Turning 0.45 kg by 10 degrees shifts its weight by 0.77 N."""
     held = payload()
     a = np.radians(10.0)
@@ -98,13 +98,13 @@ def test_a_tare_at_one_angle_is_wrong_on_an_incline_and_a_calibration_is_not():
     assert np.linalg.norm(corrected[:3]) < 1e-9
 
 
-def test_a_weight_of_the_other_sign_is_refused_when_the_mounting_is_stated():
+def test_an_inverted_weight_is_refused_if_the_mounting_is_stated():
     held, rotations = payload(sign=-1.0), orientations(12)
     with pytest.raises(SettingsError, match=r"its sign is not \+1"):
         fit_sensor(rotations, readings(held, rotations), mounting=(0.0, 1.0))
 
 
-def test_readings_of_no_weight_are_refused():
+def test_readings_without_weight_are_refused():
     rotations = orientations(12)
     shown = np.tile(BIAS, (12, 1))
     shown[:, 2] += 1e-9 * rotations[:, 2, 2]

@@ -26,7 +26,7 @@ def corners(terrain, more=()):
 
 
 @given(st.floats(0, 30), st.floats(-170, 170))
-def test_a_touched_plate_is_recovered(incline_deg, heading_deg):
+def test_a_plate_is_recovered_from_touched_points(incline_deg, heading_deg):
     expected = frame(incline_deg, heading_deg)
     fit = fit_terrain(corners(expected, [(0.2, 0.0), (0.3, 0.05)]))
     assert fit.frame.incline == pytest.approx(expected.incline, abs=1e-9)
@@ -37,7 +37,7 @@ def test_a_touched_plate_is_recovered(incline_deg, heading_deg):
     assert abs(fit.roll) < 1e-9
 
 
-def test_half_a_millimetre_of_touch_keeps_incline_and_heading():
+def test_touch_noise_keeps_incline_and_heading():
     rng = np.random.default_rng(2)
     expected = frame(10.0, 5.0)
     for _ in range(50):
@@ -48,7 +48,7 @@ def test_half_a_millimetre_of_touch_keeps_incline_and_heading():
         assert np.degrees(fit.frame.heading) == pytest.approx(5.0, abs=1.0)
 
 
-def test_stones_show_in_the_residual():
+def test_stones_increase_the_residual():
     rng = np.random.default_rng(3)
     points = corners(frame(), [(0.1, 0.0), (0.2, 0.05), (0.3, -0.05)])
     points[:, 2] += rng.normal(0, 0.006, len(points))
@@ -61,7 +61,7 @@ def test_a_container_that_leans_to_one_side_has_a_roll():
     assert np.degrees(abs(fit_terrain(points).roll)) == pytest.approx(3.0, abs=0.1)
 
 
-def test_the_row_of_the_matrix_is_held_against_the_touch():
+def test_the_matrix_row_is_compared_with_the_touch():
     fit = fit_terrain(corners(frame(10.0)))
     check_terrain(fit, frame(10.9), is_forced=False)
     with pytest.raises(SettingsError, match=r"inclined by 10\.0 degrees.*says 15\.0"):
@@ -82,7 +82,7 @@ def test_the_same_corner_twice_is_refused():
         fit_terrain(points)
 
 
-def test_a_wall_is_no_terrain():
+def test_a_wall_is_not_a_terrain():
     steep = dataclasses.replace(frame(), incline=float(np.radians(60)))
     with pytest.raises(SettingsError, match="steeper than 45"):
         fit_terrain(corners(steep))

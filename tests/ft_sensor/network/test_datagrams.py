@@ -45,7 +45,7 @@ def reader_of(far_end, port):
     return reader
 
 
-def test_whole_datagrams_of_the_sensor_are_read_in_pieces(far_end, port):
+def test_datagrams_are_read_in_pieces(far_end, port):
     reader = reader_of(far_end, port)
     for k in range(3):
         far_end.sendto(bytes([k]) * 36, reader)
@@ -56,7 +56,7 @@ def test_whole_datagrams_of_the_sensor_are_read_in_pieces(far_end, port):
     assert port.strange == 1
 
 
-def test_nobody_else_is_heard_and_one_address_is_bound(far_end, port):
+def test_only_the_sensors_address_is_received(far_end, port):
     reader = reader_of(far_end, port)
     assert reader[0] == "127.0.0.1"
     with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as stranger:
@@ -79,7 +79,7 @@ def read_often(link):
         link.read_available()
 
 
-def test_an_address_where_nobody_is_ends_as_a_link_error():
+def test_an_unreachable_address_is_a_link_error():
     with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as free:
         free.bind(("127.0.0.1", 0))
         address = SensorAddress(*free.getsockname())
@@ -92,18 +92,18 @@ def test_an_address_where_nobody_is_ends_as_a_link_error():
 @pytest.mark.parametrize(
     "text", ["", "sensor.local", "1.2.3", "192.168.1.1:0", "192.168.1.1:x", "::1"]
 )
-def test_what_is_no_address_is_refused(text):
+def test_an_invalid_address_is_refused(text):
     with pytest.raises(SettingsError, match="not an address"):
         parse_address(text, 49152)
 
 
 @pytest.mark.parametrize("text", ["224.0.0.1", "0.0.0.0", "255.255.255.255"])
-def test_the_address_of_many_is_refused(text):
+def test_an_address_of_several_hosts_is_refused(text):
     with pytest.raises(SettingsError, match="not the address of a single sensor"):
         parse_address(text, 49152)
 
 
-def test_an_address_has_the_usual_port_unless_it_says_another():
+def test_an_address_has_the_default_port_unless_stated():
     assert parse_address("192.168.1.1", 49152).text == "192.168.1.1:49152"
     assert parse_address("192.168.1.1:5000", 49152).port == 5000
 
@@ -118,7 +118,7 @@ def scanned(*numbers, scanner=None):
     return [[reading.ticks for reading in group] for group in found], scanner
 
 
-def test_records_are_the_bytes_that_the_protocol_states():
+def test_records_have_the_documented_bytes():
     assert ati.encode_request(ati.STREAM).hex() == "1234000200000000"
     assert ati.encode_request(ati.STOP, 1).hex() == "1234000000000001"
     data = record(1, 0x80020000, (-1, 2, 3, 4, 5, 6))
@@ -129,19 +129,19 @@ def test_records_are_the_bytes_that_the_protocol_states():
     assert ati.decode_request(b"1234") is None
 
 
-def test_packets_are_put_in_order_and_taken_once():
+def test_packets_are_reordered_and_used_once():
     found, scanner = scanned([1, 2, 4, 3, 3], [3, 5, 5], [7, 6])
     assert found == [[1, 2, 3, 4], [5], [6, 7]]
     assert scanner.late == 3
 
 
-def test_numbers_wrap():
+def test_sequence_numbers_wrap():
     last = ati.MODULUS - 1
     found, _ = scanned([last - 1, 0, last], [1])
     assert found == [[last - 1, last, 0], [1]]
 
 
-def test_a_sensor_that_began_anew_is_handed_on():
+def test_packets_of_a_restarted_sensor_are_accepted():
     found, _ = scanned([5000, 5001], [1, 2], [3])
     assert found == [[5000, 5001], [1, 2], [3]]
 
@@ -157,7 +157,7 @@ def test_a_sensor_that_began_anew_is_handed_on():
         (1 << 5, False, 0),
     ],
 )
-def test_the_bits_of_the_status_decide_what_is_trusted(status, is_trusted, saturated):
+def test_status_bits_decide_validity(status, is_trusted, saturated):
     (reading,) = ati.RdtScanner((1.0,) * 6, (1e9,) * 6).feed(record(1, status))
     assert (reading.is_trusted, reading.saturated) == (is_trusted, saturated)
     assert bool(ati.status_texts(status)) == bool(status)
@@ -192,7 +192,7 @@ class FuzzedNetwork(LossyNetwork):
         return [*packets, *((t_ns, rng.bytes(36)) for _ in range(rng.integers(4)))]
 
 
-def test_one_percent_lost_doubled_and_overtaken_costs_what_was_lost():
+def test_a_poor_network_costs_only_the_lost_packets():
     bench, network = lossy_bench(lost=0.01, doubled=0.01, overtaken=0.01)
     before = bench.sensor.counters
     found = bench.run(10 * S)
@@ -213,7 +213,7 @@ def test_one_percent_lost_doubled_and_overtaken_costs_what_was_lost():
     assert (np.abs(mean - LOAD) < np.repeat([1.3, 0.06], 3)).all()
 
 
-def test_samples_of_a_bad_network_are_never_older_than_six_milliseconds_unseen():
+def test_stale_samples_of_a_poor_network_are_always_flagged():
     bench, _ = lossy_bench(lost=0.01)
     ages = []
     for _ in range(2000):
@@ -223,7 +223,7 @@ def test_samples_of_a_bad_network_are_never_older_than_six_milliseconds_unseen()
     assert max(ages) < 6 * MS
 
 
-def test_fuzzed_packets_raise_nothing_and_what_is_absurd_is_not_valid():
+def test_fuzzed_packets_raise_no_error_and_absurd_values_are_invalid():
     networks = []
 
     def network(stream):
@@ -241,7 +241,7 @@ def test_fuzzed_packets_raise_nothing_and_what_is_absurd_is_not_valid():
 
 
 @pytest.mark.slow
-def test_a_network_that_is_pulled_and_put_back_twenty_times_is_read_again():
+def test_a_repeatedly_unplugged_network_is_read_again():
     bench = SensorBench("ati")
     ports = []
 

@@ -31,16 +31,16 @@ def errors(ppm, worst_ns, seconds=20, lost=0.0, seed=1):
 
 @pytest.mark.parametrize("ppm", [0.0, 50.0, -50.0, 200.0])
 @pytest.mark.parametrize("worst_ns", [500_000, 8_000_000])
-def test_a_time_is_known_to_a_tenth_of_a_millisecond(ppm, worst_ns):
+def test_a_device_time_is_mapped_accurately(ppm, worst_ns):
     found = errors(ppm, worst_ns)
     assert np.abs(found).max() < 100_000
 
 
-def test_lost_messages_do_no_harm():
+def test_lost_messages_do_not_bias_the_fit():
     assert np.abs(errors(50.0, 4_000_000, lost=0.5)).max() < 100_000
 
 
-def test_a_stall_that_delays_half_a_second_of_messages_is_seen_through():
+def test_a_burst_of_delayed_messages_does_not_bias_the_fit():
     rng = np.random.default_rng(2)
     fit = ClockFit()
     worst = 0
@@ -54,14 +54,14 @@ def test_a_stall_that_delays_half_a_second_of_messages_is_seen_through():
     assert worst < 100_000
 
 
-def test_before_the_first_line_the_least_delay_counts():
+def test_before_the_first_fit_the_smallest_delay_counts():
     fit = ClockFit()
     for k, delay in enumerate([900_000, 50_000, 700_000]):
         fit.offer(k * PERIOD, k * PERIOD + delay)
     assert fit.host_ns(2 * PERIOD) == 2 * PERIOD + 50_000
 
 
-def test_a_restarted_clock_is_learnt_anew():
+def test_a_restarted_clock_is_fitted_again():
     fit = ClockFit()
     for k in range(2000):
         fit.offer(k * PERIOD, k * PERIOD + 7 * S)
@@ -70,7 +70,7 @@ def test_a_restarted_clock_is_learnt_anew():
     assert fit.host_ns(10 + PERIOD) == 30 * S + PERIOD
 
 
-def test_two_clocks_never_run_further_apart_than_crystals_do():
+def test_clock_drift_is_bounded_by_crystal_tolerance():
     fit = ClockFit()
     for k in range(4000):
         fit.offer(k * PERIOD, k * PERIOD + k * PERIOD // 100)  # one per cent
@@ -79,7 +79,7 @@ def test_two_clocks_never_run_further_apart_than_crystals_do():
 
 
 @pytest.mark.slow
-def test_a_day_needs_no_more_memory_than_a_minute():
+def test_memory_does_not_grow_with_duration():
     fit = ClockFit()
     for k in range(86_400 // 10):  # a message every 10 s shows the arithmetic
         t = 10 * k * S

@@ -64,7 +64,7 @@ def test_link_is_readable_in_the_sense_of_the_clock():
     assert isinstance(SerialLink(ScriptedPort()), Readable)
 
 
-def test_reading_takes_what_is_there_and_does_not_wait():
+def test_reading_returns_available_bytes_without_waiting():
     link = SerialLink(ScriptedPort(b"abc"))
     assert link.is_readable()
     assert link.read_available() == b"abc"
@@ -72,7 +72,7 @@ def test_reading_takes_what_is_there_and_does_not_wait():
     assert link.read_available() == b""
 
 
-def test_one_reading_is_bounded():
+def test_one_read_is_bounded():
     link = SerialLink(ScriptedPort(b"x" * 5000))
     assert len(link.read_available()) == 4096
     assert len(link.read_available()) == 904
@@ -84,7 +84,7 @@ def test_discarding_empties_the_input():
     assert link.read_available() == b""
 
 
-def test_a_port_without_descriptor_has_number_minus_one():
+def test_a_port_without_a_descriptor_has_descriptor_minus_one():
     assert SerialLink(ScriptedPort()).fileno() == -1
 
 
@@ -98,7 +98,7 @@ def test_a_port_without_descriptor_has_number_minus_one():
         lambda link: link.write(b"C"),
     ],
 )
-def test_a_failing_port_asks_whether_it_is_unplugged(error, use):
+def test_a_failing_port_suggests_a_check_of_the_plug(error, use):
     link = SerialLink(ScriptedPort(error=error))
     with pytest.raises(LinkError, match="Unplugged"):
         use(link)
@@ -146,7 +146,7 @@ def test_missing_low_latency_mode_is_a_warning(terminal):
     assert "low-latency" in opened.warning
 
 
-def test_a_taken_port_is_refused(terminal):
+def test_a_port_in_use_is_refused(terminal):
     first = open_port(terminal[1], 460800)
     try:
         with pytest.raises(LinkError, match="Cannot open"):
@@ -158,7 +158,7 @@ def test_a_taken_port_is_refused(terminal):
 @pytest.mark.parametrize(
     ("text", "is_warned"), [("16\n", True), ("1\n", False), ("what", False)]
 )
-def test_latency_timer_is_read_back(tmp_path, text, is_warned):
+def test_the_latency_timer_is_read_back(tmp_path, text, is_warned):
     folder = tmp_path / "ttyUSB0" / "device"
     folder.mkdir(parents=True)
     (folder / "latency_timer").write_text(text)

@@ -19,7 +19,7 @@ def test_non_finite_numbers_are_invalid():
     assert not sample.is_valid
 
 
-def test_dates_rise_when_a_late_batch_reaches_back():
+def test_time_stamps_increase_despite_a_late_batch():
     timestamper = SampleTimestamper(SHOWN)
     frames = [reading(1250 * k, k) for k in range(4)]
     found = timestamper.date(frames[:1], 100 * MS)
@@ -27,7 +27,7 @@ def test_dates_rise_when_a_late_batch_reaches_back():
     assert all(before.t_ns < after.t_ns for before, after in pairwise(found))
 
 
-def test_a_jump_of_the_device_clock_does_not_move_the_dates():
+def test_a_device_clock_jump_does_not_shift_the_time_stamps():
     timestamper = SampleTimestamper(SHOWN)
     frames = [
         reading(t_us, k)
@@ -37,7 +37,7 @@ def test_a_jump_of_the_device_clock_does_not_move_the_dates():
     assert found[-1].t_ns - found[0].t_ns == 2 * 1_250_000
 
 
-def test_wrap_inside_a_run_loses_nothing():
+def test_a_wrap_within_a_run_loses_no_sample():
     timestamper = SampleTimestamper(SHOWN)
     frames = [reading((2**32 - 2500 + 1250 * k) % 2**32, k) for k in range(5)]
     found = timestamper.date(frames, 100 * MS)

@@ -57,7 +57,7 @@ def test_force_and_torque_in_either_order_make_one_sample(pairing, order):
     ("status", "is_valid", "saturated"),
     [(0x80, True, 0), (0x84, True, 0x3F), (0x01, True, 0x3F), (0xC4, False, 0x3F)],
 )
-def test_the_status_after_the_torque_judges_the_force_too(
+def test_the_status_after_the_torque_applies_to_the_force_too(
     pairing, status, is_valid, saturated
 ):
     (sample,) = receive(
@@ -87,7 +87,7 @@ def test_a_reading_at_its_range_is_saturated_in_that_axis(pairing, wrench, satur
 
 
 @pytest.mark.parametrize("half", [(FORCE_ID, FORCE), (TORQUE_ID, TORQUE)])
-def test_half_an_answer_is_counted_and_pairs_with_no_later_one(half):
+def test_half_a_reply_is_counted_and_never_paired_with_a_later_one(half):
     counters = BarrettCounters()
     pairing = WrenchPairing(counters)
     pairing.ask(0)
@@ -99,7 +99,7 @@ def test_half_an_answer_is_counted_and_pairs_with_no_later_one(half):
 
 
 @pytest.mark.parametrize("half", [(FORCE_ID, FORCE), (TORQUE_ID, TORQUE)])
-def test_of_two_equal_halves_the_first_is_dropped(half):
+def test_the_first_of_two_equal_halves_is_dropped(half):
     counters = BarrettCounters()
     pairing = WrenchPairing(counters)
     pairing.ask(0)
@@ -107,7 +107,7 @@ def test_of_two_equal_halves_the_first_is_dropped(half):
     assert counters.unpaired == 1
 
 
-def test_an_answer_nobody_asked_for_is_dropped():
+def test_an_unsolicited_reply_is_dropped():
     counters = BarrettCounters()
     pairing = WrenchPairing(counters)
     pairing.ask(0)
@@ -130,7 +130,7 @@ frames = st.tuples(
 
 
 @given(st.lists(st.one_of(frames, st.none()), max_size=30))
-def test_no_frames_make_more_samples_than_questions(heard):
+def test_there_are_no_more_samples_than_requests(heard):
     counters = BarrettCounters()
     pairing = WrenchPairing(counters)
     samples = []
@@ -144,7 +144,7 @@ def test_no_frames_make_more_samples_than_questions(heard):
     assert times == sorted(set(times))
 
 
-def test_a_status_is_told_in_words():
+def test_a_status_is_described():
     assert status_texts(0) == ()
     assert status_texts(0x80) == ("tare suggested",)
     assert status_texts(0xC4) == (
@@ -190,7 +190,7 @@ class Bench:
         return found
 
 
-def test_the_wrench_is_asked_for_right_after_the_positions():
+def test_the_wrench_is_requested_right_after_the_positions():
     bench = Bench().started()
     begin_ns = bench.clock.t_ns
     bench.run(1)
@@ -200,7 +200,7 @@ def test_the_wrench_is_asked_for_right_after_the_positions():
     ]
 
 
-def test_every_cycle_that_asks_but_the_first_has_the_sample_of_the_one_before():
+def test_each_polling_cycle_has_the_sample_of_the_previous_one():
     bench = Bench().started()
     found = bench.run(46)
     assert found[0][1] == []
@@ -209,7 +209,7 @@ def test_every_cycle_that_asks_but_the_first_has_the_sample_of_the_one_before():
     assert bench.sensor.counters == BarrettCounters(samples=45 + 20)
 
 
-def test_a_sample_is_dated_with_the_instant_at_which_it_was_taken():
+def test_a_sample_is_stamped_with_its_sampling_time():
     # The load tells the time: 7.3 N a second, no step of it in time with the cycles.
     begin_ns = SteppedClock().t_ns
     bench = Bench(lambda t_ns: ((t_ns - begin_ns) * 7.3e-9, 0, 0, 0, 0, 0)).started()
@@ -222,7 +222,7 @@ def test_a_sample_is_dated_with_the_instant_at_which_it_was_taken():
     assert np.mean(shown - true) == pytest.approx(0.0, abs=0.001)
 
 
-def test_positions_come_as_early_with_the_sensor_as_without():
+def test_the_sensor_does_not_delay_positions():
     def arrival(bench):
         bench.arm.start()
         if bench.network.options.has_sensor:
@@ -234,7 +234,7 @@ def test_positions_come_as_early_with_the_sensor_as_without():
     assert arrival(Bench()) == arrival(Bench(has_sensor=False))
 
 
-def test_a_silent_sensor_costs_the_arm_nothing():
+def test_a_silent_sensor_does_not_delay_the_arm():
     bench = Bench().started()
     bench.network.silence(8)
     found = bench.run(20)
@@ -258,7 +258,7 @@ def test_a_sensor_opened_first_is_woken_and_left_alone_while_it_boots():
     assert times[wake + 1] - times[wake] >= 1000 * MS
 
 
-def test_an_opened_sensor_says_who_it_is():
+def test_an_opened_sensor_reports_its_identity():
     fields = Bench().started().sensor.describe()
     assert fields["model"] == "Barrett force/torque sensor, node 8"
     assert fields["serial_number"] == "1008"
@@ -272,18 +272,18 @@ def test_opening_sends_no_tare():
     assert not [data for _, _, data in bench.rig.sent if data[0] == 0xB6]
 
 
-def test_a_missing_sensor_is_told():
+def test_a_missing_sensor_is_reported():
     with pytest.raises(LinkTimeoutError, match="node 8\\) does not answer") as caught:
         Bench(has_sensor=False).sensor.open()
     assert "ft_sensor.kind" in caught.value.hint
 
 
-def test_a_sensor_that_does_not_wake_up_is_told():
+def test_a_sensor_that_does_not_wake_up_is_reported():
     with pytest.raises(DeviceFaultError, match="STAT unknown, not 2"):
         Bench(are_asleep=True, boot_ns=5000 * MS).sensor.open()
 
 
-def test_a_node_without_force_and_torque_is_told():
+def test_a_node_without_force_and_torque_is_reported():
     bench = Bench()
     bench.network.faults.drop(TORQUE_ID, count=None)
     with pytest.raises(LinkTimeoutError, match=r"no force and torque \(ROLE 0x0006\)"):
@@ -295,7 +295,7 @@ def test_a_sensor_with_a_saturated_gauge_is_refused():
         Bench(lambda _: (0, 90.0, 0, 0, 0, 0)).sensor.open()
 
 
-def test_closing_twice_forgets_what_was_heard():
+def test_closing_twice_discards_pending_samples():
     bench = Bench().started()
     bench.arm.read(bench.clock.t_ns)
     bench.rig.rest(CYCLE_NS)

@@ -48,7 +48,7 @@ def test_crc_gives_the_published_check_value():
 
 
 @given(st.binary(max_size=64))
-def test_fast_crc_equals_the_bitwise_one(data):
+def test_the_table_crc_equals_the_bitwise_one(data):
     assert bota.crc_x25(data) == bitwise_x25(data)
 
 
@@ -76,32 +76,32 @@ def test_invalid_frame_carries_no_numbers():
     assert all(map(math.isnan, frame.wrench))
 
 
-def test_payload_full_of_headers_decodes():
+def test_a_payload_full_of_headers_decodes():
     frame = bota.decode_frame(HEADERS_INSIDE)
     assert frame is not None
     assert (frame.wrench[0], frame.device_us) == (-21.25, 0xAAAAAAAA)
 
 
-def test_a_short_frame_is_none():
+def test_a_short_frame_is_rejected():
     assert bota.decode_frame(NORMAL[:36]) is None
     assert bota.decode_frame(NORMAL, 1) is None
 
 
-def test_a_field_that_does_not_fit_is_refused():
+def test_a_field_out_of_range_is_refused():
     with pytest.raises(struct.error):
         bota.encode_frame(BotaFrame(0x10000, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0, 0.0))
 
 
-def test_device_time_unwraps_over_the_end_of_32_bits():
+def test_device_time_unwraps_across_32_bits():
     assert TIMING.unwrap(100, 2**32 - 1150) == 2**32 + 100
     assert TIMING.unwrap(100, 5 * 2**32 + 50) == 5 * 2**32 + 100
 
 
-def test_device_time_that_steps_back_stays_a_step_back():
+def test_a_backward_step_of_device_time_stays_one():
     assert TIMING.unwrap(2**32 - 10, 2**32 + 5) == 2**32 - 10
 
 
-def test_status_is_told_in_words():
+def test_a_status_is_described():
     words = bota.status_texts(BotaStatus.OVER_RANGE | BotaStatus.RAW_GAUGE | 0x100)
     assert len(words) == 3
     assert "range exceeded" in words[0]
@@ -121,7 +121,7 @@ def test_acknowledgement_is_found_between_frames():
     assert bota.find_acknowledgements(data) == [Acknowledgement("C", 0)]
 
 
-def test_acknowledgement_cut_short_is_not_yet_one():
+def test_a_truncated_acknowledgement_is_not_yet_accepted():
     assert bota.find_acknowledgements(NORMAL + b"r,0,C,") == []
 
 
@@ -131,13 +131,13 @@ def test_acknowledgement_survives_a_hostile_code():
 
 
 @given(st.sampled_from("CRIcf"), st.integers(0, 99))
-def test_acknowledgements_decode_to_themselves(letter, code):
+def test_acknowledgements_round_trip(letter, code):
     answer = Acknowledgement(letter, code)
     data = bota.encode_acknowledgement(answer)
     assert bota.find_acknowledgements(data) == [answer]
 
 
-def test_boot_text_is_found_with_any_line_end():
+def test_boot_text_is_found_with_any_line_ending():
     data = b"\x00junk App Init\r\nname: SensX\rS/N: 123\r\nFW version: 2.1 b\n"
     text = bota.find_boot_text(data)
     assert text == BootText(True, "SensX", "123", "2.1 b")
@@ -150,7 +150,7 @@ def test_boot_text_waits_for_the_end_of_a_line():
     assert not text.is_complete
 
 
-def test_wire_time_of_a_frame_is_four_fifths_of_a_millisecond():
+def test_the_wire_time_of_a_frame_follows_from_the_baud_rate():
     assert wire_time_ns(37, 460800) == 802_951
 
 

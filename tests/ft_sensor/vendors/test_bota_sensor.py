@@ -71,7 +71,7 @@ class ForgetfulPort(FakeSerialPort):
         return len(data)
 
 
-def test_a_device_that_opening_the_port_resets_opens_too():
+def test_a_device_reset_by_opening_the_port_opens():
     bench = Bench(BotaOptions(is_running=True, resets_on_open=True)).opened()
     assert all(sample.is_valid for sample in bench.run(100 * MS))
 
@@ -84,7 +84,7 @@ def test_opening_sends_the_documented_commands_only():
     assert port.written == b"Cc,0,1,0,4f,64,0,0,0R"
 
 
-def test_sensor_left_in_configuration_mode_opens_again():
+def test_a_sensor_left_in_configuration_mode_opens():
     bench = Bench(BotaOptions(is_running=True)).opened()
     bench.sensor.close()
     assert bench.device.next_event_ns() is not None  # the answer to the stop
@@ -101,12 +101,12 @@ def test_refused_command_is_named(letter, text):
         bench.sensor.open()
 
 
-def test_inactive_matrix_is_started_again():
+def test_an_inactive_matrix_is_restarted():
     bench = Bench(BotaOptions(raw_starts=2)).opened()
     assert not any(s.status & BotaStatus.RAW_GAUGE for s in bench.run(100 * MS))
 
 
-def test_matrix_that_stays_inactive_is_refused():
+def test_a_matrix_that_stays_inactive_is_refused():
     bench = Bench(BotaOptions(raw_starts=100))
     with pytest.raises(DeviceFaultError, match="raw gauge data"):
         bench.sensor.open()
@@ -119,14 +119,14 @@ def test_absurd_numbers_without_a_flag_are_refused(axis):
         Bench(load=load).sensor.open()
 
 
-def test_standing_device_clock_is_refused_at_the_start():
+def test_a_stopped_device_clock_is_refused_at_start():
     bench = Bench()
     bench.device.is_clock_frozen = True
     with pytest.raises(DeviceFaultError, match="stands still"):
         bench.sensor.open()
 
 
-def test_a_command_that_got_lost_is_repeated():
+def test_a_lost_command_is_repeated():
     bench = Bench(BotaOptions(is_running=True))
     port = ForgetfulPort(bench.device, bench.clock)
     bench.clock.world = port
@@ -134,26 +134,26 @@ def test_a_command_that_got_lost_is_repeated():
     assert bench.opened().run(100 * MS)
 
 
-def test_rate_below_495_hz_is_refused():
+def test_a_rate_too_low_for_the_loop_is_refused():
     bench = Bench(BotaOptions(sinc=104))
     with pytest.raises(DeviceFaultError, match=r"sends 49[12]\.\d Hz, at least 495"):
         bench.sensor.open()
 
 
-def test_rate_is_not_taken_on_the_word_of_a_slow_device_clock():
+def test_a_slow_device_clock_does_not_set_the_rate():
     # It counts 800 Hz with seconds that last 1.67.
     bench = Bench(BotaOptions(clock_error_ppm=-400_000))
     with pytest.raises(DeviceFaultError, match=r"sends 4[78]\d\.\d Hz"):
         bench.sensor.open()
 
 
-def test_rate_of_502_hz_is_accepted():
+def test_a_rate_just_above_nominal_is_accepted():
     told = Bench(BotaOptions(sinc=102)).opened().sensor.describe()
     # counted over a quarter of a second: good to a frame or two
     assert float(told["measured_rate"].split()[0]) == pytest.approx(502.0, abs=5.0)
 
 
-def test_description_tells_who_and_how_fast():
+def test_the_description_states_identity_and_rate():
     told = Bench(BotaOptions(clock_error_ppm=50)).opened().sensor.describe()
     assert told["serial_number"] == "20001"
     assert told["name"] == "Fake F/T sensor"
@@ -162,7 +162,7 @@ def test_description_tells_who_and_how_fast():
     assert float(told["measured_rate"].split()[0]) == pytest.approx(800, abs=4)
 
 
-def test_description_of_a_running_stream_has_no_serial_number():
+def test_the_description_of_a_running_stream_has_no_serial_number():
     told = Bench(BotaOptions(is_running=True)).opened().sensor.describe()
     assert told["serial_number"].startswith("unknown")
 
@@ -187,7 +187,7 @@ def test_newest_sample_is_one_wire_time_before_its_arrival():
     assert newest.t_ns == bench.clock.now_ns() - 802_951
 
 
-def test_true_sampling_time_is_within_one_period_before_the_date():
+def test_true_sampling_times_precede_their_time_stamps_by_at_most_a_period():
     bench = Bench().opened()
     start = bench.device.on_since_ns
     for sample in bench.run(100 * MS):
@@ -229,7 +229,7 @@ def shown_with(bench, axis, value):
         *((axis, 5000.0) for axis in range(6)),
     ],
 )
-def test_a_value_no_sensor_measures_is_not_valid_despite_its_checksum(axis, value):
+def test_an_implausible_value_is_invalid_despite_its_checksum(axis, value):
     bench = Bench().opened()
     found = shown_with(bench, axis, value)
     assert found
@@ -244,7 +244,7 @@ def test_a_value_somewhat_beyond_the_range_is_valid():
     assert all(sample.is_valid for sample in found)
 
 
-def test_device_time_passes_the_end_of_32_bits():
+def test_device_time_continues_across_32_bits():
     bench = Bench(BotaOptions(clock_start_us=2**32 - 1_600_000)).opened()
     found = bench.run(300 * MS)
     counters = [sample.counter for sample in found]
@@ -258,7 +258,7 @@ def test_device_time_passes_the_end_of_32_bits():
     "wrong",
     [{"baudrate": 12345}, {"baudrate": 115200}, {"sinc": 0}, {"rate_check": 0.0}],
 )
-def test_settings_no_sensor_can_do_are_refused(wrong):
+def test_unsupported_settings_are_refused(wrong):
     settings = {"baudrate": 460800, "sinc": 64, "rate_check": 0.25} | wrong
     with pytest.raises(SettingsError):
         BotaDevice(

@@ -102,7 +102,7 @@ def framing(request):
 
 @pytest.mark.parametrize("name", FRAMINGS)
 @given(data=st.data())
-def test_frames_come_through_in_any_chunking(name, data):
+def test_frames_are_decoded_in_any_chunking(name, data):
     framing = FRAMINGS[name]
     sent = data.draw(st.lists(framing.frames, max_size=6))
     scanner = framing.scanner()
@@ -132,7 +132,7 @@ def test_a_scanner_holds_less_than_a_frame(name, noise):
         assert scanner.held < framing.size
 
 
-def test_a_frame_with_any_byte_changed_is_none(framing):
+def test_a_frame_with_any_byte_changed_is_rejected(framing):
     frame = framing.encode(framing.noisy(random.Random(2), 3))
     for position in range(framing.size):
         damaged = bytearray(frame)

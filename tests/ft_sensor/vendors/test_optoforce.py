@@ -51,7 +51,7 @@ def test_golden_overload_names_both_axes():
         (0, ()),
     ],
 )
-def test_a_status_is_told_in_words(status, words):
+def test_a_status_is_described(status, words):
     assert optoforce.status_texts(status) == words
 
 
@@ -81,16 +81,16 @@ def test_golden_answers_are_found_inside_the_stream():
     assert bytes.fromhex("AB00120800C5") == optoforce.ASK_SERIAL
 
 
-def test_a_three_axis_frame_is_no_frame():
+def test_a_three_axis_frame_is_not_accepted():
     assert optoforce.decode_frame(THREE_AXES + THREE_AXES) is None
 
 
-def test_a_number_that_does_not_fit_is_refused():
+def test_a_value_out_of_range_is_refused():
     with pytest.raises(struct.error):
         optoforce.encode_frame(OptoForceFrame(70000, 0, (0, 0, 0, 0, 0, 0)))
 
 
-def test_lost_frames_are_counted_over_the_end_of_the_counter():
+def test_lost_frames_are_counted_across_a_counter_wrap():
     bench = SensorBench("optoforce", counter_start=65536 - 600).opened()
     bench.run(100 * MS)
     bench.device.go_silent()
@@ -145,7 +145,7 @@ def test_a_sensor_without_serial_number_is_refused():
         (1_000_000, {"sensitivity": (0.0, 1, 1, 1, 1, 1)}),
     ],
 )
-def test_settings_no_sensor_can_do_are_refused(baudrate, settings):
+def test_unsupported_settings_are_refused(baudrate, settings):
     values = {"sensitivity": SENSITIVITY, "serial_number": SERIAL_NUMBER} | settings
     with pytest.raises(SettingsError):
         OptoForceDevice(

@@ -36,7 +36,7 @@ def samples(name, start=0.0, stop=np.inf):
     ]
 
 
-def test_the_tare_of_a_real_sensor_takes_forty_two_newtons_away():
+def test_the_tare_of_a_real_sensor_removes_its_offset():
     rest = samples("zero")
     result = take_mean(rest, LIMIT, rate=RATE)
     assert result.wrench[:3] == pytest.approx((6.9, 42.1, 3.5), abs=0.15)
@@ -58,7 +58,7 @@ def test_a_real_press_peaks_where_it_was_published(name, peak):
     assert cross_talk < 0.03 * F_n.max()
 
 
-def test_a_press_cannot_be_taken_for_a_tare():
+def test_a_press_is_not_accepted_as_a_tare():
     with pytest.raises(TareError, match="varied"):
         take_mean(samples("smooth_1_press"), LIMIT, rate=RATE)
 

@@ -68,24 +68,24 @@ def test_torque_scale_follows_the_model():
     assert reading.wrench[3] == pytest.approx(0.2)
 
 
-def test_an_answer_or_a_single_sample_is_no_streamed_one():
+def test_a_reply_or_single_sample_is_not_a_streamed_sample():
     frame = RobotousFrame((0, 0, 0, 0, 0, 0), 0)
     single = robotous.encode_frame(frame, robotous.SAMPLE)
     assert robotous.decode_frame(single) is None
 
 
 @given(st.binary(min_size=11, max_size=11))
-def test_hostile_commands_decode_or_are_none(data):
+def test_hostile_commands_decode_or_are_ignored(data):
     found = robotous.decode_command(data)
     assert found is None or encode_command(found[0], *found[1]) == data
 
 
-def test_a_count_that_does_not_fit_is_refused():
+def test_a_count_out_of_range_is_refused():
     with pytest.raises(struct.error):
         robotous.encode_frame(RobotousFrame((40000, 0, 0, 0, 0, 0), 0))
 
 
-def test_it_is_identified_and_its_settings_are_read_back():
+def test_the_sensor_is_identified_and_its_settings_are_read_back():
     bench = SensorBench("robotous").opened()
     told = bench.sensor.describe()
     assert told["model"] == "Robotous RFT60-HA01"
@@ -100,7 +100,7 @@ def test_a_model_with_another_torque_scale_shows_the_same_load():
     assert bench.run(20 * MS)[-1].wrench[4] == pytest.approx(0.2, abs=0.001)
 
 
-def test_a_setting_that_was_not_taken_is_noticed():
+def test_a_setting_that_was_not_applied_is_detected():
     with pytest.raises(DeviceFaultError, match="reads back filter code"):
         SensorBench("robotous", forgets=True).sensor.open()
 
@@ -111,7 +111,7 @@ def test_a_refused_setting_is_named_with_its_reason():
         refusing.sensor.open()
 
 
-def test_a_model_without_scale_is_refused():
+def test_a_model_without_a_known_scale_is_refused():
     with pytest.raises(DeviceFaultError, match="'RFT99-XX00', whose scale is unknown"):
         SensorBench("robotous", model="RFT99-XX00").sensor.open()
 
@@ -121,7 +121,7 @@ def test_a_model_that_is_too_slow_is_refused():
         SensorBench("robotous", model="RFT40-SA01").sensor.open()
 
 
-def test_a_new_sensor_is_told_to_speak_faster_and_its_power_to_be_cycled():
+def test_a_new_sensor_is_set_to_its_baud_rate_and_needs_a_power_cycle():
     bench = SensorBench("robotous", baudrate=115200)
     driver = RobotousDevice(
         PortSettings("/dev/sensor", 115200, 0.25), RobotousSettings()
@@ -143,7 +143,7 @@ def test_a_sensor_that_stops_answering_is_named():
         bench.sensor.open()
 
 
-def test_a_loss_that_nobody_saw_is_found_by_the_arrival_times():
+def test_an_undetected_loss_is_found_from_arrival_times():
     bench = SensorBench("robotous").opened()
     bench.run(1500 * MS)
     for _ in range(3):
@@ -164,6 +164,6 @@ def test_a_loss_that_nobody_saw_is_found_by_the_arrival_times():
         ((921600, 0.0), {}),
     ],
 )
-def test_settings_no_sensor_can_do_are_refused(line, settings):
+def test_unsupported_settings_are_refused(line, settings):
     with pytest.raises(SettingsError):
         RobotousDevice(PortSettings("/dev/sensor", *line), RobotousSettings(**settings))

@@ -63,11 +63,11 @@ def log():
         ("7E1 01", "node 31 sends 7e1 01"),
     ],
 )
-def test_a_frame_is_put_into_words(log, frame, words):
+def test_a_frame_is_described(log, frame, words):
     assert log(0, frame).removesuffix(", UNASKED") == words.removesuffix(", UNASKED")
 
 
-def test_an_answer_says_how_long_it_took(log):
+def test_a_reply_states_its_latency(log):
     log(0, "001 44")
     assert log(187 * US, "426 C4 00 00 10 00 00") == (
         "puck 1 answers CTS = 4096, 187 us after the question"
@@ -79,13 +79,13 @@ def test_an_answer_says_how_long_it_took(log):
     )
 
 
-def test_an_answer_after_a_millisecond_is_late(log):
+def test_a_reply_beyond_the_expected_latency_is_late(log):
     log(0, "001 05")
     assert "LATE: 1001 us" in log(1001 * US, "426 85 00 02 00")
     assert log.reader.tally.late == 1
 
 
-def test_an_answer_that_nobody_asked_for_is_told(log):
+def test_an_unsolicited_reply_is_reported(log):
     assert log(0, "426 85 00 02 00").endswith(", UNASKED")
     log(MS, "001 05")
     log(MS + 100 * US, "426 85 00 02 00")
@@ -104,7 +104,7 @@ def test_a_puck_that_misses_one_round_is_named(log):
     assert log.reader.finish() == []
 
 
-def test_a_question_is_given_up_after_a_second(log):
+def test_a_request_expires(log):
     log(0, "00F 05")
     log(999 * MS, "001 05")
     assert "UNANSWERED node 15: STAT" not in log.said
@@ -112,14 +112,14 @@ def test_a_question_is_given_up_after_a_second(log):
     assert "UNANSWERED node 15: STAT" in log.said
 
 
-def test_questions_open_at_the_end_are_told_with_their_time(log):
+def test_requests_open_at_the_end_are_reported_with_their_time(log):
     log(5 * MS, "001 05")
     log(6 * MS, "00F 05")
     ((utc_ns, text),) = [(s.utc_ns, s.text) for s in log.reader.finish()]
     assert (utc_ns, text) == (5 * MS, "UNANSWERED puck 1: STAT")
 
 
-def test_a_question_at_the_very_end_of_a_log_is_not_counted(log):
+def test_a_request_at_the_very_end_of_a_log_is_not_counted(log):
     log(5 * MS, "001 05")
     log(5 * MS + 200 * US, "426 85 00 02 00")
     log(6 * MS, "00F 05")
@@ -128,7 +128,7 @@ def test_a_question_at_the_very_end_of_a_log_is_not_counted(log):
     assert (tally.questions, tally.answers, not tally.silent) == (1, 1, True)
 
 
-def test_two_questions_at_once_have_an_answer_each(log):
+def test_two_concurrent_requests_each_have_their_reply(log):
     log(0, "001 05")
     log(10 * US, "001 05")
     assert "100 us" in log(100 * US, "426 85 00 02 00")
@@ -136,14 +136,14 @@ def test_two_questions_at_once_have_an_answer_each(log):
     assert log.reader.tally.silent == {}
 
 
-def test_the_names_follow_the_firmware_that_a_puck_tells(log):
+def test_property_names_follow_the_reported_firmware(log):
     assert log(0, "001 4D") == "host asks puck 1 for HOLD"
     log(0, "001 00")
     log(100 * US, "426 80 00 64 00")  # VERS 100
     assert log(5 * MS, "001 4D") == "host asks puck 1 for EN"
 
 
-def test_a_sleeping_puck_has_the_names_of_its_monitor(log):
+def test_a_sleeping_puck_has_the_property_names_of_its_monitor(log):
     log(0, "426 85 00 00 00")
     log(0, "426 80 00 C8 00")  # the monitor's revision, not the firmware's
     assert log(MS, "001 09") == "host asks puck 1 for SAVE"
@@ -151,7 +151,7 @@ def test_a_sleeping_puck_has_the_names_of_its_monitor(log):
     assert log(3 * MS, "001 09") == "host asks puck 1 for TEMP"
 
 
-def test_the_sensor_answers_a_question_with_two_frames(log):
+def test_the_sensor_answers_one_request_with_two_frames(log):
     log(0, "008 36")
     assert "100 us" in log(100 * US, "50A 00 01 80 FD 31 F6")
     assert "200 us" in log(200 * US, "50B 9A 01 00 FC 3D 00")
@@ -163,14 +163,14 @@ def test_frames_of_other_kinds_are_counted(log):
     assert log.reader.tally.foreign == 1
 
 
-def test_an_error_frame_of_the_controller_is_put_into_words(log):
+def test_an_error_frame_of_the_controller_is_described(log):
     said = log(0, "20000204 0020000000008200", is_of_wam=False)
     assert "the controller reports: passive" in said
     assert log.reader.tally.errors == {"passive": 1}
     assert log.reader.tally.foreign == 0
 
 
-def test_a_jump_of_the_clock_is_said_and_no_answer_counted_across_it(log):
+def test_a_clock_jump_is_reported_and_no_reply_matched_across_it(log):
     log(5000 * MS, "001 05")
     log(1000 * MS, "426 85 00 02 00 00 00")
     assert "TIME GOES BACK by 4.000 s" in log.said
@@ -179,7 +179,7 @@ def test_a_jump_of_the_clock_is_said_and_no_answer_counted_across_it(log):
     assert (tally.unasked, tally.silent.total()) == (1, 0)
 
 
-def test_a_gap_is_said_and_leaves_its_question_unanswered(log):
+def test_a_gap_is_reported_and_leaves_its_request_unanswered(log):
     log(1000 * MS, "001 05")
     log(4500 * MS, "001 05")
     assert log.said[1:3] == ["UNANSWERED puck 1: STAT", "3.500 s without a frame"]

@@ -42,12 +42,12 @@ FRAMES = [
 
 @pytest.mark.parametrize(("can_id", "data", "names"), FRAMES)
 @pytest.mark.parametrize("flag", [FLAG, 0])  # python-can takes it away
-def test_an_error_frame_says_what_it_reports(can_id, data, names, flag):
+def test_an_error_frame_is_described(can_id, data, names, flag):
     can_id = can_id & ~FLAG | flag
     assert error_names(can_id, bytes.fromhex(data)) == names
 
 
-def test_any_identifier_and_any_bytes_report_something():
+def test_any_identifier_and_bytes_give_a_description():
     for can_id in range(0x800):
         for byte in (0x00, 0x5A, 0xA5, 0xFF):
             assert error_names(can_id, bytes([byte] * 8))
@@ -79,19 +79,19 @@ WARNING = (0x204, "0004")
         ((OFF, RESTARTED), BusCondition.SOUND),
     ],
 )
-def test_a_bus_is_off_until_it_is_restarted(frames, condition):
+def test_bus_off_lasts_until_a_restart(frames, condition):
     assert after(*frames).condition is condition
 
 
 @pytest.mark.parametrize("frame", [OFF, PASSIVE])
-def test_an_arm_that_answers_ends_every_condition(frame):
+def test_a_reply_of_the_arm_clears_every_bus_condition(frame):
     errors = after(frame)
     errors.confirm()
     assert errors.condition is BusCondition.SOUND
     assert errors.frames == 1
 
 
-def test_errors_are_counted_by_what_they_report():
+def test_errors_are_counted_by_kind():
     errors = after(PASSIVE, PASSIVE, OFF)
     assert errors.frames == 3
     assert errors.text() == "bus-off 1, passive 2"

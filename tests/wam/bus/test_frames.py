@@ -147,7 +147,7 @@ def test_sets_of_four_and_six_bytes_mean_the_same(data):
     assert request == frames.Property(48, 5204)
 
 
-def test_one_byte_with_bit_seven_is_no_request():
+def test_a_lone_byte_with_its_top_bit_set_is_not_a_request():
     with pytest.raises(FrameError):
         frames.decode_request(b"\x85")
 
@@ -192,13 +192,13 @@ def test_a_position_that_contradicts_the_layout_is_refused(data):
 
 
 @given(st.integers(-(1 << 40), 1 << 40))
-def test_a_wrapped_position_is_what_the_wire_makes_of_it(counts):
+def test_an_out_of_range_position_wraps_as_on_the_wire(counts):
     on_wire = frames.encode_position(counts)
     assert frames.wrap_positions([counts]) == [frames.decode_position(on_wire)]
 
 
 @given(st.integers(-(2**21), 2**21 - 1))
-def test_a_position_survives_the_wire(counts):
+def test_a_position_round_trips(counts):
     assert frames.decode_position(frames.encode_position(counts)) == counts
 
 
@@ -218,12 +218,12 @@ def test_the_property_number_of_old_firmware_leads_the_torques():
 
 
 @given(st.tuples(int14, int14, int14, int14))
-def test_torques_survive_the_wire(units):
+def test_torques_round_trip(units):
     assert frames.decode_torques(frames.encode_torques(units)) == units
 
 
 @pytest.mark.parametrize("data", ["aa", "2a" + "00" * 7, "aa" + "00" * 8])
-def test_a_frame_of_another_shape_is_no_torque_frame(data):
+def test_a_frame_of_another_shape_is_not_a_torque_frame(data):
     with pytest.raises(FrameError):
         frames.decode_torques(bytes.fromhex(data))
 
@@ -243,7 +243,7 @@ def test_a_force_frame_may_have_a_seventh_byte():
             frames.decode_force(bytes(size))
 
 
-def test_force_beyond_the_frame_is_clipped():
+def test_force_beyond_the_range_of_the_frame_is_clipped():
     clipped = frames.decode_force(frames.encode_force((200.0, -200.0, 0.0)))
     assert clipped == (0x7FFF / 256, -128.0, 0.0)
 
@@ -278,7 +278,7 @@ def test_the_seven_motors_report_under_their_own_identifiers():
     assert found == [0x423, 0x443, 0x463, 0x483, 0x4A3, 0x4C3, 0x4E3]
 
 
-def test_groups_have_the_numbers_of_the_wire():
+def test_groups_have_their_protocol_numbers():
     assert {group.name: int(group) for group in Group} == {
         "BUS": 0,
         "LOWER_TORQUE": 1,
@@ -317,24 +317,24 @@ def test_the_safety_module_is_node_10():
     assert frames.SAFETY_NODE == 10
 
 
-@pytest.mark.parametrize("sender", [0, 1, 7, 8, 9, 10, 11, 20, 31])
 @pytest.mark.parametrize("to", [*range(1, 9), 10])
-def test_a_frame_to_a_device_of_the_arm_is_a_hosts_whatever_it_names(sender, to):
-    assert frames.is_of_host(frames.compose_id(sender, to, is_group=False))
+def test_a_frame_to_a_device_is_from_a_host_whatever_its_sender_field(to):
+    for sender in range(32):
+        assert frames.is_of_host(frames.compose_id(sender, to, is_group=False))
 
 
-@pytest.mark.parametrize("sender", [0, 1, 7, 8, 20, 31])
 @pytest.mark.parametrize("group", [0, 1, 2, 4, 5])
-def test_a_command_to_a_group_is_a_hosts_whatever_it_names(sender, group):
-    assert frames.is_of_host(frames.compose_id(sender, group, is_group=True))
+def test_a_group_command_is_from_a_host_whatever_its_sender_field(group):
+    for sender in (0, 1, 7, 8, 20, 31):
+        assert frames.is_of_host(frames.compose_id(sender, group, is_group=True))
 
 
 @pytest.mark.parametrize("sender", [8, 9, 10, 20, 31])
-def test_a_position_of_no_motor_is_a_hosts(sender):
+def test_a_position_from_a_node_that_is_not_a_motor_is_from_a_host(sender):
     assert frames.is_of_host(frames.compose_id(sender, 3, is_group=True))
 
 
-def test_what_devices_say_is_not_of_a_host():
+def test_frames_of_devices_are_not_attributed_to_a_host():
     replies = [0x426, 0x4E6, 0x506, 0x546, 0x423, 0x4E3, 0x427, 0x50A, 0x50B, 0x50C]
     hand = [frames.position_reply_id(11), frames.property_reply_id(14)]
     # A node that is not of the arm may be asked who it is; the safety module announces.

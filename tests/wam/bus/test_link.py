@@ -66,7 +66,7 @@ def opened(monkeypatch):
     return make
 
 
-def test_an_interface_that_is_down_says_how_to_raise_it(opened):
+def test_an_interface_that_is_down_is_reported_with_the_remedy(opened):
     with pytest.raises(LinkError) as caught:
         opened(RuntimeError("opened all the same"), is_up=False)()
     assert caught.value.message == "can0 is down."
@@ -86,12 +86,12 @@ def test_an_interface_that_is_missing_is_named(opened):
         ValueError("bad channel"),
     ],
 )
-def test_every_way_not_to_open_is_a_link_error(opened, error):
+def test_every_failure_to_open_is_a_link_error(opened, error):
     with pytest.raises(LinkError, match="cannot be opened"):
         opened(error)()
 
 
-def test_a_bus_that_opens_is_handed_over_with_what_has_arrived(opened):
+def test_an_opened_bus_keeps_frames_that_already_arrived(opened):
     bus = ScriptedBus([message(0x040, is_error_frame=True)])
     assert opened(bus)() is bus
     link = opened_link(bus)
@@ -100,7 +100,7 @@ def test_a_bus_that_opens_is_handed_over_with_what_has_arrived(opened):
     link.close()
 
 
-def test_only_data_frames_of_devices_come_through():
+def test_only_data_frames_of_devices_are_passed_on():
     bus = ScriptedBus(
         [
             message(0x001),
@@ -118,14 +118,14 @@ def test_only_data_frames_of_devices_come_through():
     link.close()
 
 
-def test_the_broadcast_of_the_safety_module_is_a_hint_only():
+def test_the_broadcast_of_the_safety_module_is_only_a_hint():
     link = opened_link(ScriptedBus([message(0x540)]))
     assert link.receive() == []
     assert link.mode_hints == 1
     link.close()
 
 
-def test_looking_keeps_what_arrived_for_the_reader():
+def test_polling_keeps_received_frames_for_the_reader():
     link = opened_link(ScriptedBus([message(0x426)]))
     assert link.is_readable()
     assert len(link.receive()) == 1
@@ -133,13 +133,13 @@ def test_looking_keeps_what_arrived_for_the_reader():
     link.close()
 
 
-def test_a_flood_does_not_hold_the_reader():
+def test_a_flood_does_not_block_the_reader():
     link = opened_link(ScriptedBus([message(0x426)] * 2000))
     assert 0 < len(link.receive()) < 1000
     link.close()
 
 
-def test_an_error_that_looking_came_across_is_the_readers():
+def test_an_error_found_by_polling_is_raised_to_the_reader():
     bus = ScriptedBus(error=can.CanOperationError("Network is down", errno.ENETDOWN))
     link = opened_link(bus)
     assert not link.is_readable()
@@ -150,7 +150,7 @@ def test_an_error_that_looking_came_across_is_the_readers():
     link.close()
 
 
-def test_a_bus_that_breaks_is_a_link_error_but_never_readable():
+def test_a_broken_bus_raises_a_link_error_and_is_never_readable():
     bus = ScriptedBus(error=can.CanOperationError("Network is down", errno.ENETDOWN))
     link = opened_link(bus)
     assert not link.is_readable()
@@ -170,7 +170,7 @@ def test_a_bus_that_breaks_is_a_link_error_but_never_readable():
         OSError(errno.ENOBUFS, "No buffer space available"),
     ],
 )
-def test_a_full_queue_is_known_by_its_number(error):
+def test_a_full_queue_is_recognised_by_its_error_number(error):
     link = opened_link(ScriptedBus(error=error))
     with pytest.raises(LinkFullError, match="send queue is full") as refused:
         link.send(1, b"\x05")
@@ -190,7 +190,7 @@ def test_closing_twice_shuts_the_bus_down_once():
         link.send(1, b"\x05")
 
 
-def test_a_link_has_the_descriptor_of_its_bus():
+def test_a_link_has_the_file_descriptor_of_its_bus():
     link = opened_link(ScriptedBus())
     assert link.fileno() == 7
     assert isinstance(link, Readable)
@@ -198,7 +198,7 @@ def test_a_link_has_the_descriptor_of_its_bus():
     link.close()
 
 
-def test_a_tap_hears_all_plain_frames_sent_and_received():
+def test_a_tap_gets_all_data_frames_sent_and_received():
     heard = []
     bus = ScriptedBus(
         [
@@ -216,7 +216,7 @@ def test_a_tap_hears_all_plain_frames_sent_and_received():
     link.close()
 
 
-def test_a_tap_hears_what_came_before_the_bus_broke():
+def test_a_tap_gets_frames_received_before_the_bus_broke():
     class Breaking(ScriptedBus):
         def _recv_internal(self, timeout):
             if not self.messages:
@@ -243,14 +243,14 @@ def test_the_first_frame_of_another_master_is_kept():
 
 
 @pytest.mark.parametrize("can_id", [0x021, 0x281, 0x4E1, 0x682, 0x684, 0x283 | 0x400])
-def test_another_master_with_a_node_of_its_own_is_one(can_id):
+def test_another_master_with_its_own_node_is_detected(can_id):
     link = opened_link(ScriptedBus([message(0x426), message(can_id, b"\x30")]))
     assert [frame.can_id for frame in link.receive()] == [0x426]
     assert link.foreign_id == can_id
     link.close()
 
 
-def test_an_interface_is_set_up_to_come_back_and_to_hold_one_cycle():
+def test_interface_setup_restarts_the_bus_and_queues_one_cycle():
     words = setup_command("can1", 500_000).split()
     assert words[:5] == ["ip", "link", "set", "can1", "up"]
     kind = words.index("type")  # all that follows is of the controller

@@ -28,7 +28,7 @@ def test_a_frame_is_written_as_candump_writes_it():
     st.integers(0, 0x7FF),
     st.binary(max_size=8),
 )
-def test_a_frame_survives_the_text_to_the_microsecond(micros, can_id, data):
+def test_a_logged_frame_round_trips_to_the_microsecond(micros, can_id, data):
     frame = parse_frame(format_frame(micros * 1000, "can0", can_id, data), 7)
     assert (frame.utc_ns, frame.can_id, frame.data) == (micros * 1000, can_id, data)
     assert (frame.channel, frame.line, frame.is_of_wam) == ("can0", 7, True)
@@ -44,11 +44,11 @@ def test_a_frame_survives_the_text_to_the_microsecond(micros, can_id, data):
         "(1.000000) can0 404##1" + 64 * "AA",
     ],
 )
-def test_frames_of_other_kinds_are_told_apart(text):
+def test_frames_of_other_kinds_are_distinguished(text):
     assert not parse_frame(text, 1).is_of_wam
 
 
-def test_the_direction_that_candump_adds_is_no_error():
+def test_the_direction_that_candump_adds_is_accepted():
     assert parse_frame(KNOWN + " R", 1).data == b"\x30"
 
 
@@ -77,7 +77,7 @@ def test_a_malformed_line_is_named(text):
 
 
 @given(st.text(max_size=100))
-def test_no_text_does_more_than_be_refused(text):
+def test_any_text_is_read_or_refused(text):
     try:
         frame = parse_frame(text, 1)
     except CanLogError:
@@ -100,7 +100,7 @@ def test_frames_are_read_in_the_order_of_their_times():
     assert [frame.can_id for frame in parse_log(lines, pytest.fail)] == [0, 1, 2, 2, 3]
 
 
-def test_a_long_log_is_read_as_it_comes():
+def test_a_long_log_is_streamed():
     def lines():
         for t in range(300):
             yield format_frame(t * 1000, "can0", t, b"")
@@ -109,14 +109,14 @@ def test_a_long_log_is_read_as_it_comes():
     assert next(parse_log(lines(), pytest.fail)).can_id == 0
 
 
-def test_what_follows_a_jump_back_keeps_its_place():
+def test_frames_after_a_backward_time_jump_keep_their_order():
     times = [2_000_000, 5_000_000, 1, 3, 2, 2_500_000]
     lines = [format_frame(t * 1000, "can0", k, b"") for k, t in enumerate(times)]
     frames = list(parse_log(lines, pytest.fail))
     assert [frame.can_id for frame in frames] == [0, 1, 2, 4, 3, 5]
 
 
-def test_a_line_without_an_end_counts_as_one(tmp_path):
+def test_an_endless_line_counts_as_one(tmp_path):
     log = tmp_path / "bus.log"
     log.write_text(f"{KNOWN}\n{'x' * 5_000_000}\n{KNOWN}\n")
     problems = []
@@ -153,7 +153,7 @@ def test_the_memory_of_a_log_is_bounded():
     assert len(sink.text.splitlines()) == 4096
 
 
-def test_monotonic_times_become_utc():
+def test_monotonic_times_are_converted_to_utc():
     class Apart(SteppedClock):
         def utc_ns(self):
             return self.t_ns + KNOWN_NS
@@ -166,7 +166,7 @@ def test_monotonic_times_become_utc():
     assert frame.utc_ns - KNOWN_NS == 500_000_000
 
 
-def test_a_disk_that_fails_ends_the_log_and_nothing_else():
+def test_a_failing_disk_ends_only_the_log():
     sink = Sink(OSError(28, "No space left on device"))
     log = CanLog(sink.write, SteppedClock(), "can0")
     log.add(1, b"")
@@ -178,7 +178,7 @@ def test_a_disk_that_fails_ends_the_log_and_nothing_else():
     assert sink.text == ""
 
 
-def test_a_channel_can_not_break_the_format():
+def test_a_channel_name_cannot_break_the_format():
     sink = Sink()
     log = CanLog(sink.write, SteppedClock(), "my bus\n")
     log.add(1, b"")

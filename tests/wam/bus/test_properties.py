@@ -23,7 +23,7 @@ CURRENT = {
 
 
 @pytest.mark.parametrize(("name", "number"), CURRENT.items())
-def test_current_motor_firmware_has_its_numbers(name, number):
+def test_current_motor_firmware_has_its_property_numbers(name, number):
     assert property_number(Device.MOTOR, name, 200) == number
 
 
@@ -57,7 +57,7 @@ def test_current_motor_firmware_has_its_numbers(name, number):
         ("VBUS", 60, 47),
     ],
 )
-def test_numbers_move_with_the_firmware(name, vers, number):
+def test_property_numbers_depend_on_the_firmware(name, vers, number):
     assert property_number(Device.MOTOR, name, vers) == number
 
 
@@ -67,7 +67,7 @@ def test_a_property_the_firmware_lacks_is_an_error_with_its_name(name, vers):
         property_number(Device.MOTOR, name, vers)
 
 
-def test_safety_module_has_numbers_of_its_own():
+def test_safety_module_has_its_own_property_numbers():
     table = numbers(Device.SAFETY, 200)
     assert [table[n] for n in ("ZERO", "PEN", "VL2", "TL2", "IFAULT", "VNOM")] == [
         *(42, 43, 46, 48, 55, 56)
@@ -91,7 +91,7 @@ def test_old_safety_firmware_shares_the_motor_table():
         (61, (42, 43, 46, 48, 55, 31, 32)),
     ],
 )
-def test_numbers_of_the_safety_module_move_too(vers, expected):
+def test_property_numbers_of_the_safety_module_depend_on_the_firmware(vers, expected):
     asked = ("ZERO", "PEN", "VL2", "TL2", "IFAULT", "LOAD", "DEF")
     assert tuple(property_number(Device.SAFETY, n, vers) for n in asked) == expected
 
@@ -99,7 +99,7 @@ def test_numbers_of_the_safety_module_move_too(vers, expected):
 @pytest.mark.parametrize(
     ("vers", "nearest"), [(-5, 32), (31, 32), (32, 32), (200, 200), (201, 200)]
 )
-def test_an_unknown_firmware_has_a_neighbour_that_is_documented(vers, nearest):
+def test_an_unknown_firmware_maps_to_the_nearest_documented_one(vers, nearest):
     assert nearest_documented(vers) == nearest
 
 
@@ -110,23 +110,23 @@ def test_sensor_has_one_table_for_every_version():
     ]
 
 
-def test_a_sleeping_puck_knows_properties_0_to_10_only():
+def test_a_sleeping_puck_has_only_monitor_properties():
     assert sorted(numbers(Device.MONITOR).values()) == list(range(11))
 
 
-def test_property_42_means_something_else_on_every_device():
+def test_one_property_number_has_a_different_meaning_on_each_device():
     kinds = (Device.MOTOR, Device.SAFETY, Device.SENSOR)
     assert [names(kind, 200)[42] for kind in kinds] == ["T", "ZERO", "SG1"]
 
 
 @pytest.mark.parametrize("vers", [61, 65, 125, 132, 175, 200])
-def test_a_number_has_one_meaning_apart_from_the_alias(vers):
+def test_a_property_number_has_one_meaning_except_for_the_alias(vers):
     found = sorted(numbers(Device.MOTOR, vers).values())
     doubles = [n for n, m in pairwise(found) if n == m]
     assert doubles == [17]  # FET1 is also called TENSION
 
 
-def test_32_bit_properties_leave_a_gap_behind_them():
+def test_32_bit_properties_are_followed_by_a_free_number():
     table = names(Device.MOTOR, 200)
     wide = [n for n, name in table.items() if is_wide(name)]
     assert len(wide) == 13

@@ -125,7 +125,7 @@ def scripted(*script, clock=None):
     return SocketcanTransport(OldSocket(), "can0", clock or Apart(), calls)
 
 
-def test_what_is_sent_is_a_can_frame_of_linux(pair):
+def test_sent_frames_have_the_linux_can_layout(pair):
     transport, far = pair
     transport.send(0x404, b"\x30")
     transport.send(0x408, bytes(range(8)))
@@ -133,7 +133,7 @@ def test_what_is_sent_is_a_can_frame_of_linux(pair):
     assert far.recv(99) == bytes.fromhex("08040000 08000000 0001020304050607")
 
 
-def test_what_arrives_keeps_its_order_its_length_and_its_flags(pair):
+def test_received_frames_keep_their_order_length_and_flags(pair):
     transport, far = pair
     for frame in (
         can_frame(0x426, b"\x00\x01\x02"),
@@ -151,7 +151,7 @@ def test_what_arrives_keeps_its_order_its_length_and_its_flags(pair):
     assert transport.receive() == []
 
 
-def test_a_link_sorts_what_the_kernel_hands_out(pair):
+def test_a_link_sorts_data_frames_from_error_frames(pair):
     transport, far = pair
     link = CanLink(transport)
     for frame in (
@@ -181,20 +181,20 @@ def test_a_flood_of_error_frames_is_sorted_once_and_hides_no_frame():
 
 
 @pytest.mark.parametrize("size", [0, 1, 15])
-def test_a_datagram_that_is_no_frame_is_dropped(pair, size):
+def test_a_datagram_that_is_not_a_frame_is_dropped(pair, size):
     transport, far = pair
     far.send(bytes(size))
     far.send(can_frame(0x426, b"\x07"))
     assert [frame.can_id for frame in transport.receive()] == [0x426]
 
 
-def test_a_length_beyond_eight_bytes_takes_no_more_than_there_are(pair):
+def test_a_length_beyond_eight_bytes_reads_only_the_bytes_present(pair):
     transport, far = pair
     far.send(can_frame(0x426, bytes(8), length=200))
     assert [len(frame.data) for frame in transport.receive()] == [8]
 
 
-def test_frames_that_have_not_left_are_known(pair):
+def test_unsent_frames_are_detected(pair):
     transport, far = pair
     assert not transport.has_unsent()
     transport.send(0x404, b"\x30")
@@ -203,11 +203,11 @@ def test_frames_that_have_not_left_are_known(pair):
     assert not transport.has_unsent()
 
 
-def test_a_kernel_that_does_not_tell_what_has_left_stops_no_torque():
+def test_a_kernel_without_a_send_queue_count_does_not_stop_torques():
     assert not scripted().has_unsent()
 
 
-def test_a_queue_that_is_full_is_told_from_a_bus_that_broke(pair):
+def test_a_full_queue_is_distinguished_from_a_broken_bus(pair):
     transport, far = pair
     with pytest.raises(LinkFullError):
         flood(transport)
@@ -222,14 +222,14 @@ def flood(transport):
         transport.send(0x404, b"\x30")
 
 
-def test_a_flood_does_not_hold_the_reader():
+def test_a_flood_does_not_block_the_reader():
     arrived = (can_frame(0x426, b"\x07"), b"")
     transport = scripted(*[arrived] * 2000)
     assert 0 < len(transport.receive()) < 1000
 
 
 @pytest.mark.parametrize("make", ["kernel", "python-can"])
-def test_what_came_before_an_error_is_not_lost_and_the_error_neither(make):
+def test_neither_an_error_nor_the_frames_before_it_are_lost(make):
     if make == "kernel":
         down = OSError(errno.ENETDOWN, "Network is down")
         transport = scripted((can_frame(0x426, b"\x07"), b""), down)
@@ -263,7 +263,7 @@ def test_frames_lost_on_the_socket_are_counted():
     assert CanLink(transport).metadata()["link:lost_frames"] == "7"
 
 
-def test_the_kernels_stamp_is_of_the_hosts_clock():
+def test_kernel_time_stamps_are_on_the_host_clock():
     clock = Apart()
     transport = scripted(
         (can_frame(1), stamps(clock.utc_ns() - 3 * MS)),
@@ -278,7 +278,7 @@ def test_the_kernels_stamp_is_of_the_hosts_clock():
     assert transport.name == "kernel socket"
 
 
-def test_a_stamp_and_a_count_of_lost_frames_come_together():
+def test_a_time_stamp_and_a_drop_count_are_read_together():
     clock = Apart()
     transport = scripted(
         (can_frame(1), stamps(clock.utc_ns() - 3 * MS) + lost(9)),
@@ -301,7 +301,7 @@ def test_a_stamp_and_a_count_of_lost_frames_come_together():
         bytes(128),
     ],
 )
-def test_ancillary_data_of_another_kind_says_nothing(damaged):
+def test_unknown_ancillary_data_is_ignored(damaged):
     transport = scripted((can_frame(1, b"\x07"), damaged), (can_frame(2), b""))
     frames = [(f.can_id, f.data, f.t_ns) for f in transport.receive()]
     assert frames == [(1, b"\x07", 0), (2, b"", 0)]
@@ -332,14 +332,14 @@ def test_an_error_behind_a_full_call_is_not_lost():
     assert [frame.can_id for frame in transport.receive()] == [77]
 
 
-def test_a_call_that_took_all_there_is_is_not_followed_by_another():
+def test_a_call_that_drained_the_socket_is_not_repeated():
     calls = ScriptedCalls(*[(can_frame(i), b"") for i in range(9)])
     transport = SocketcanTransport(OldSocket(), "can0", Apart(), calls)
     assert len(transport.receive()) == 9
     assert calls.calls == 1
 
 
-def test_a_transport_that_is_closed_reads_nobody_elses_socket(pair):
+def test_a_closed_transport_does_not_read_a_reused_descriptor(pair):
     transport, far = pair
     far.send(can_frame(0x426))
     transport.close()
@@ -347,13 +347,13 @@ def test_a_transport_that_is_closed_reads_nobody_elses_socket(pair):
         transport.receive()
 
 
-def test_a_c_library_without_the_call_is_told(monkeypatch):
+def test_a_c_library_without_recvmmsg_is_reported(monkeypatch):
     monkeypatch.setattr(datagrams.ctypes, "CDLL", lambda *_, **__: object())
     with pytest.raises(OSError, match="recvmmsg"):
         system_call()
 
 
-def test_the_adapters_own_stamps_keep_the_distances_of_the_frames():
+def test_adapter_time_stamps_keep_the_spacing_of_frames():
     clock = Apart()
     utc_ns, own_ns = clock.utc_ns() - 10 * MS, 77 * MS  # it counts from its start
     delays = (900_000, 200_000, 1_500_000, 200_000)
@@ -368,7 +368,7 @@ def test_the_adapters_own_stamps_keep_the_distances_of_the_frames():
     assert "adapter" in transport.name
 
 
-def test_an_adapters_clock_that_drifts_is_followed():
+def test_a_drifting_adapter_clock_is_tracked():
     clock, drift = AdapterClock(), 50e-6
     for second in range(3600):
         kernel_ns = AHEAD_NS + second * NS_PER_S
@@ -378,14 +378,14 @@ def test_an_adapters_clock_that_drifts_is_followed():
 
 
 @pytest.mark.parametrize("step_ns", [4295 * NS_PER_S, -4295 * NS_PER_S, 100 * MS])
-def test_a_clock_that_is_set_or_wraps_begins_again(step_ns):
+def test_a_clock_that_is_set_or_wraps_is_synchronised_again(step_ns):
     clock = AdapterClock()
     clock.utc_ns(AHEAD_NS, 5 * NS_PER_S)
     kernel_ns = AHEAD_NS + NS_PER_S
     assert clock.utc_ns(kernel_ns, 6 * NS_PER_S + step_ns) == kernel_ns
 
 
-def test_a_stamp_of_the_adapter_alone_needs_one_of_the_kernel_before():
+def test_an_adapter_time_stamp_needs_an_earlier_kernel_time_stamp():
     clock = AdapterClock()
     assert clock.utc_ns(0, 5 * NS_PER_S) == 0
     clock.utc_ns(AHEAD_NS, 5 * NS_PER_S)
@@ -402,7 +402,7 @@ def test_a_stamp_of_the_adapter_alone_needs_one_of_the_kernel_before():
         (1.5, 0),  # the future
     ],
 )
-def test_a_stamp_of_python_can_counts_where_it_is_plausible(stamp, expected_ns):
+def test_a_python_can_time_stamp_is_used_if_plausible(stamp, expected_ns):
     transport = PythonCanTransport(
         ScriptedBus([message(0x426, timestamp=stamp)]), Apart()
     )
@@ -412,7 +412,7 @@ def test_a_stamp_of_python_can_counts_where_it_is_plausible(stamp, expected_ns):
 
 
 @pytest.mark.parametrize("channel", ["", "nocan17", "a-name-that-is-too-long", "a\0b"])
-def test_an_interface_that_is_not_there_is_refused(channel):
+def test_a_missing_interface_is_refused(channel):
     with pytest.raises(OSError, match="No such device") as refused:
         interface_state(channel)
     assert refused.value.errno == errno.ENODEV
@@ -420,7 +420,7 @@ def test_an_interface_that_is_not_there_is_refused(channel):
         open_transport("socketcan", channel, 1_000_000, SteppedClock())
 
 
-def test_an_interface_that_is_there_has_a_state():
+def test_an_existing_interface_has_a_state():
     name = socket.if_nameindex()[0][1]
     told = Path("/sys/class/net", name)
     flags = int((told / "flags").read_text(), 16)
@@ -436,7 +436,7 @@ def test_an_interface_that_is_down_is_not_opened(monkeypatch):
         open_transport("socketcan", "can0", 1_000_000, SteppedClock())
 
 
-def test_other_adapters_go_through_python_can(monkeypatch):
+def test_other_adapters_are_opened_through_python_can(monkeypatch):
     bus = ScriptedBus()
     monkeypatch.setattr(transports.can, "Bus", lambda **_: bus)
     transport = open_transport("pcan", "PCAN_USBBUS1", 1_000_000, SteppedClock())

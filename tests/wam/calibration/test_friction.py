@@ -129,7 +129,7 @@ def test_intervals_hold_the_true_coulomb_friction(fit):
 
 
 @pytest.mark.slow
-def test_residuals_that_are_alike_within_a_block_widen_the_interval():
+def test_correlated_residuals_within_a_block_widen_the_interval():
     quiet = rows_of(truth(), 4, noise=1e-4)
     wide, narrow = (
         fit_friction(
@@ -141,12 +141,12 @@ def test_residuals_that_are_alike_within_a_block_widen_the_interval():
     assert np.median(wide.asymmetry_deviation / narrow.asymmetry_deviation) > 1.3
 
 
-def test_one_change_of_the_weight_explains_all_motors(fit):
+def test_one_weight_correction_explains_all_motors(fit):
     assert fit.moments.ravel() == pytest.approx(HEAVIER, abs=1e-3)
 
 
 @pytest.mark.slow
-def test_presliding_is_what_gives_way_up_to_the_torque_that_breaks_away():
+def test_presliding_is_the_displacement_up_to_breakaway():
     rows = rows_of(truth(), 1)
     broken = truth().coulomb * truth().breakaway
     bent = 1.3e-3 * TURNS / broken  # rad per N m of an elastic bristle
@@ -172,7 +172,7 @@ def test_a_friction_of_another_form_is_refused():
         check_friction(fit_friction(CONSTANTS, rows_of(truth(), 1), other, KNOWN))
 
 
-def test_a_motor_that_did_not_slide_both_ways_is_named():
+def test_a_motor_that_slid_in_one_direction_only_is_named():
     rows = rows_of(truth(), 1)
     forwards = rows[3].sense > 0.0
     names = set(SlidingRows.__slots__) - {"compliance"}
@@ -182,7 +182,7 @@ def test_a_motor_that_did_not_slide_both_ways_is_named():
         fit_friction(CONSTANTS, rows, rows_of(truth(), 2), KNOWN)
 
 
-def test_the_way_takes_less_than_six_minutes(legs):
+def test_the_path_stays_within_its_time_budget(legs):
     here, seconds = IN_CONTAINER, 0.0
     for leg in legs:
         move = JointMove(here, leg.halt.q, leg.halt.speed)
@@ -191,12 +191,12 @@ def test_the_way_takes_less_than_six_minutes(legs):
     assert 120.0 < seconds < 360.0
 
 
-def test_the_way_begins_and_ends_where_the_arm_stands_and_rises_first(legs):
+def test_the_path_returns_to_its_start_and_rises_first(legs):
     assert (legs[-1].halt.q == IN_CONTAINER).all()
     assert (legs[0].halt.q == UPRIGHT).all()
 
 
-def test_no_leg_is_too_fast_or_comes_too_low(model, legs):
+def test_no_leg_is_too_fast_or_too_low(model, legs):
     ends = [IN_CONTAINER, *(leg.halt.q for leg in legs)]
     for (here, goal), leg in zip(pairwise(ends), legs, strict=True):
         move = JointMove(here, goal, leg.halt.speed)
@@ -209,7 +209,7 @@ def test_no_leg_is_too_fast_or_comes_too_low(model, legs):
             assert sole[:, 2].min() > SPACE.floor
 
 
-def test_every_motor_turns_both_ways_slowly_and_fast(legs):
+def test_every_motor_turns_in_both_directions_slowly_and_fast(legs):
     turned = {}
     for before, leg in pairwise(legs):
         if leg.use is LegPurpose.TRANSIT:
@@ -225,7 +225,7 @@ def test_every_motor_turns_both_ways_slowly_and_fast(legs):
             assert side.max() > 0.1
 
 
-def test_a_held_out_way_is_none_of_those_that_are_fitted(legs):
+def test_the_held_out_path_is_not_among_the_fitted_ones(legs):
     ways = {use: set() for use in LegPurpose}
     for before, leg in pairwise(legs):
         ways[leg.use].add(tuple(np.round(leg.halt.q - before.halt.q, 6)))
@@ -233,7 +233,7 @@ def test_a_held_out_way_is_none_of_those_that_are_fitted(legs):
     assert not ways[LegPurpose.HELD_OUT] & ways[LegPurpose.FIT]
 
 
-def test_no_room_around_the_arm_is_refused(model):
+def test_a_lack_of_clearance_is_refused(model):
     with pytest.raises(SettingsError, match="poses"):
         plan_friction(model, np.array(UPRIGHT), FreeSpace(0.62))
 
@@ -249,7 +249,7 @@ def leg_of(model, motor_torque, way):
     return RecordedLeg(q, tau, 0.1)
 
 
-def test_rows_show_what_weight_does_not_explain_at_the_motor(model):
+def test_rows_contain_the_motor_torque_not_explained_by_weight(model):
     rows = sliding_rows(model, model, [leg_of(model, 0.05, 1.0)])[3]
     away = np.abs(np.abs(rows.friction) - 0.05)
     assert np.abs(rows.speed) == pytest.approx(1.8, abs=0.02)
@@ -258,14 +258,14 @@ def test_rows_show_what_weight_does_not_explain_at_the_motor(model):
     assert {-1.0, 1.0} == set(rows.sense)  # motor 4 turns against its joint
 
 
-def test_no_row_is_taken_before_the_bristle_is_bent_again(model):
+def test_no_row_is_taken_before_the_bristle_has_reversed(model):
     rows = sliding_rows(model, model, [leg_of(model, 0.05, 1.0)])[3]
     turning = -18.0 * (UPRIGHT[3] + 0.2)
     back = rows.angle[rows.sense > 0.0]
     assert np.abs(back - turning).min() > 18.0 * 6e-3
 
 
-def test_a_motor_that_stands_shows_nothing(model):
+def test_a_motor_at_rest_gives_no_rows(model):
     rows = sliding_rows(model, model, [leg_of(model, 0.05, 1.0)])
     assert [len(shown) for shown in rows] == [0, 0, 0, len(rows[3]), 0, 0, 0]
 
@@ -291,7 +291,7 @@ def jumping_leg(model, peak):
     return RecordedLeg(q, tau, 0.015)
 
 
-def test_a_light_joint_shows_its_break_away_before_it_is_thrown(model):
+def test_breakaway_of_a_light_joint_is_seen_before_it_accelerates(model):
     peak = 0.007
     rows = sliding_rows(model, model, [jumping_leg(model, peak)])[6]
     broken = rows.friction[rows.speed == 0.0]
@@ -302,7 +302,7 @@ def calibration(fit):
     return FrictionCalibration(fit, "tread", "cad", "2027-01-15T08:00:00Z", True)
 
 
-def test_a_calibration_survives_its_file_bit_for_bit(fit):
+def test_a_calibration_round_trips_bit_for_bit(fit):
     before = calibration(fit)
     after = friction_from_toml(friction_to_toml(before, CONSTANTS), "friction.toml")
     assert after.fit.rows == before.fit.rows
@@ -322,7 +322,7 @@ def test_a_calibration_survives_its_file_bit_for_bit(fit):
         ("breakaway = [1", "breakaway = [-1"),
     ],
 )
-def test_a_file_that_is_no_calibration_is_refused_by_name(fit, old, new):
+def test_a_file_that_is_not_a_calibration_is_refused_by_name(fit, old, new):
     text = friction_to_toml(calibration(fit), CONSTANTS)
     broken = text.replace(old, new) if old != "breakaway = [1" else _worse(text)
     assert broken != text
@@ -335,7 +335,7 @@ def _worse(text):
     return head + "[motors]" + motors.replace("breakaway = [1", "breakaway = [-1")
 
 
-def test_truth_and_calibration_list_the_same_figures_of_the_joints(fit):
+def test_truth_and_calibration_list_the_same_joint_parameters(fit):
     import tomllib
 
     load_at = fit.friction.load_at

@@ -43,7 +43,7 @@ def moved(joint7):
     return q
 
 
-def test_floating_is_gravity_and_nothing_else(law, foot_model):
+def test_floating_is_gravity_compensation_only(law, foot_model):
     law.enter(ArmState.FLOAT, reading(0.0))
     tau, gravity = law.torque(reading(0.0))
     assert np.array_equal(tau, gravity)
@@ -51,14 +51,14 @@ def test_floating_is_gravity_and_nothing_else(law, foot_model):
 
 
 @pytest.mark.parametrize(("seconds", "mass"), [(1.0, 0.15), (2.0, 0.3), (60.0, 0.3)])
-def test_the_virtual_mass_comes_in_two_seconds(law, foot_model, seconds, mass):
+def test_the_virtual_mass_is_ramped_in(law, foot_model, seconds, mass):
     law.enter(ArmState.FLOAT, reading(0.0))
     gravity = law.torque(reading(seconds))[1]
     assert np.allclose(gravity, compensation(foot_model, DOWN, mass), atol=1e-12)
 
 
 @pytest.mark.parametrize("state", [ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE])
-def test_the_virtual_mass_leaves_in_two_seconds(law, foot_model, state):
+def test_the_virtual_mass_is_ramped_out(law, foot_model, state):
     law.enter(ArmState.FLOAT, reading(0.0))
     law.enter(state, reading(10.0))
     for seconds, mass in ((10.0, 0.3), (11.0, 0.15), (12.0, 0.0), (99.0, 0.0)):
@@ -66,7 +66,7 @@ def test_the_virtual_mass_leaves_in_two_seconds(law, foot_model, state):
         assert np.allclose(gravity, compensation(foot_model, DOWN, mass), atol=1e-12)
 
 
-def test_floating_has_no_damping_but_at_joint_7(law):
+def test_floating_damps_only_joint_7(law):
     law.enter(ArmState.FLOAT, reading(0.0))
     qd = np.full(7, 0.5)
     tau, gravity = law.torque(reading(5.0, qd=qd))
@@ -93,7 +93,7 @@ def test_torques_do_not_jump_from_float_to_hold_at_rest(law):
 
 
 @pytest.mark.parametrize("state", POWERED)
-def test_joint_7_is_locked_where_it_was(law, state):
+def test_joint_7_is_locked_at_its_position(law, state):
     law.enter(state, reading(0.0))
     tau, gravity = law.torque(reading(5.0, q=moved(0.01)))
     assert tau[6] - gravity[6] == pytest.approx(-0.2, abs=1e-12)
@@ -107,20 +107,20 @@ def test_the_lock_is_damped_on_the_raw_difference(law):
     assert tau[6] - gravity[6] == pytest.approx(-0.2, abs=1e-12)
 
 
-def test_the_lock_keeps_its_place_from_float_to_hold(law):
+def test_the_lock_keeps_its_reference_from_float_to_hold(law):
     law.enter(ArmState.FLOAT, reading(0.0))
     law.enter(ArmState.HOLD, reading(5.0, q=moved(0.03)))
     assert law.joint7_offset(reading(5.0, q=moved(0.03))) == pytest.approx(0.03)
 
 
 @pytest.mark.parametrize("state", [ArmState.IDLE, ArmState.UNKNOWN])
-def test_idle_lets_joint_7_go(law, state):
+def test_idle_releases_joint_7(law, state):
     law.enter(ArmState.FLOAT, reading(0.0))
     law.enter(state, reading(1.0))
     assert law.joint7_offset(reading(1.0, q=moved(0.5))) == 0.0
 
 
-def test_the_torque_given_out_may_be_changed_by_its_owner(law):
+def test_a_returned_torque_may_be_modified_by_the_caller(law):
     law.enter(ArmState.FLOAT, reading(0.0))
     tau, gravity = law.torque(reading(1.0))
     kept = gravity.copy()
@@ -167,14 +167,14 @@ def test_a_wall_pushes_back_in_every_powered_state(foot_model, state):
     assert np.delete(tau - gravity, 3) == pytest.approx(np.zeros(6), abs=1e-12)
 
 
-def test_a_wall_is_no_gravity(foot_model):
+def test_a_wall_torque_is_not_counted_as_gravity(foot_model):
     # What is cut where a motor is at its limit must never be the weight of the arm.
     law = with_walls(foot_model)
     gravity = law.torque(reading(9.0, q=folded(0.05)))[1]
     assert gravity == pytest.approx(foot_model.gravity(folded(0.05)), abs=1e-12)
 
 
-def test_a_move_goes_no_faster_than_it_was_told(law):
+def test_a_move_does_not_exceed_its_speed(law):
     law.enter(ArmState.HOLD, reading(0.0))
     goal = DOWN + np.array([0, 0, 0, 0.5, 0, 0, 0.2])
     assert law.move_to(goal, 0.1, reading(1.0)) == pytest.approx(0.5 / 0.1 + 0.2)
@@ -182,14 +182,14 @@ def test_a_move_goes_no_faster_than_it_was_told(law):
 
 
 @pytest.mark.parametrize("speed", [0.0, -0.1, 0.51, float("nan")])
-def test_a_speed_that_is_none_is_refused(law, speed):
+def test_an_invalid_speed_is_refused(law, speed):
     law.enter(ArmState.HOLD, reading(0.0))
     with pytest.raises(ValueError, match="rad/s"):
         law.move_to(DOWN, speed, reading(0.0))
 
 
 @pytest.mark.parametrize("goal", [np.full(7, 4.0), np.full(7, np.nan), np.zeros(6)])
-def test_a_goal_that_cannot_be_reached_is_refused(law, goal):
+def test_an_unreachable_goal_is_refused(law, goal):
     law.enter(ArmState.HOLD, reading(0.0))
     with pytest.raises(ValueError, match="is not a pose"):
         law.move_to(goal, 0.5, reading(0.0))
@@ -214,7 +214,7 @@ def test_a_move_from_a_hold_begins_with_the_torque_of_the_hold(law):
     assert after == pytest.approx(before, abs=1e-9)
 
 
-def test_a_move_that_follows_another_begins_where_that_one_holds_the_arm(law):
+def test_a_following_move_begins_without_a_torque_step(law):
     law.enter(ArmState.HOLD, reading(0.0))
     law.move_to(DOWN, 0.5, reading(0.0))
     sagged = DOWN.copy()
@@ -227,7 +227,7 @@ def test_a_move_that_follows_another_begins_where_that_one_holds_the_arm(law):
 
 
 @pytest.mark.parametrize("state", POWERED)
-def test_a_false_position_is_given_the_weight_alone(law, foot_model, state):
+def test_a_rejected_position_gets_gravity_torque_only(law, foot_model, state):
     law.enter(state, reading(0.0))
     jump = PositionJump(motor=7, counts=400, speed=12.0)
     false = replace(reading(5.0, q=moved(0.03), qd7_raw=8.0), jump=jump)
@@ -238,7 +238,7 @@ def test_a_false_position_is_given_the_weight_alone(law, foot_model, state):
 PUSH = PoweredTestGoal(PoweredTestKind.RAMP, 2, 4.0)
 
 
-def test_in_a_proof_the_arm_gets_what_it_says_and_not_its_weight(law):
+def test_a_powered_test_replaces_gravity_compensation(law):
     law.enter(ArmState.HOLD, reading(0.0))
     law.prove(PUSH, reading(1.0))
     assert law.is_testing()
@@ -255,14 +255,14 @@ def test_in_a_proof_the_arm_gets_what_it_says_and_not_its_weight(law):
 
 
 @pytest.mark.parametrize("state", [s for s in ArmState if s is not ArmState.HOLD])
-def test_no_proof_begins_outside_of_hold(law, state):
+def test_a_powered_test_begins_only_in_hold(law, state):
     law.enter(state, reading(0.0))
     with pytest.raises(ValueError, match="proof begins in hold only"):
         law.prove(PUSH, reading(1.0))
     assert not law.is_testing()
 
 
-def test_no_arm_is_left_unwatched_for_longer_than_a_module_may_take(law):
+def test_the_heartbeat_test_is_limited_to_the_modules_timeout(law):
     law.enter(ArmState.HOLD, reading(0.0))
     with pytest.raises(ValueError, match="unwatched for too long"):
         law.prove(PoweredTestGoal(PoweredTestKind.SILENCE, seconds=0.4), reading(1.0))
@@ -270,7 +270,7 @@ def test_no_arm_is_left_unwatched_for_longer_than_a_module_may_take(law):
     assert not law.torque(reading(1.1))[0].any()
 
 
-def test_no_proof_begins_in_a_move(law):
+def test_no_powered_test_begins_in_a_move(law):
     law.enter(ArmState.HOLD, reading(0.0))
     law.move_to(DOWN, 0.5, reading(1.0))
     with pytest.raises(ValueError, match="proof begins in hold only"):
@@ -278,7 +278,7 @@ def test_no_proof_begins_in_a_move(law):
     assert law.is_moving()
 
 
-def test_what_goes_too_far_is_told_in_a_proof_only(law):
+def test_travel_excess_is_reported_only_in_a_powered_test(law):
     astray = DOWN + 0.05 * np.eye(7)[3]
     law.enter(ArmState.HOLD, reading(0.0))
     assert law.powered_test_excess(reading(0.5, q=astray), 9.0, is_powered=True) is None
@@ -294,12 +294,12 @@ def test_what_goes_too_far_is_told_in_a_proof_only(law):
 
 
 @pytest.mark.parametrize("state", ArmState)
-def test_an_arm_that_makes_no_move_turns_no_motor_in_vain(law, state):
+def test_without_a_move_no_motor_is_flagged_as_stuck(law, state):
     law.enter(state, reading(0.0))
     assert law.stuck_motor() == 0
 
 
-def test_two_thousand_cycles_leave_nothing_behind_in_memory(foot_model):
+def test_many_cycles_do_not_grow_memory(foot_model):
     law = with_walls(foot_model)
 
     def compute(cycles):
@@ -318,9 +318,7 @@ def test_two_thousand_cycles_leave_nothing_behind_in_memory(foot_model):
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
-def test_a_hold_uses_its_share_of_the_limit_and_no_more_weight_included(
-    foot_model, way
-):
+def test_a_hold_with_weight_stays_within_its_torque_share(foot_model, way):
     """Joints that carry weight and are braked with all there is, either way."""
     law = with_walls(foot_model)
     law.enter(ArmState.HOLD, reading(0.0))
@@ -330,7 +328,7 @@ def test_a_hold_uses_its_share_of_the_limit_and_no_more_weight_included(
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_a_hold_adds_nothing_to_a_weight_beyond_its_share(foot_model, side):
+def test_a_hold_adds_nothing_to_a_weight_beyond_its_torque_share(foot_model, side):
     leaning = np.array([0, side * 0.9, 0, 0.3, 0, 0, 0.2])
     law = with_walls(foot_model, torque=4.0)
     law.enter(ArmState.FLOAT, reading(0.0, q=leaning))  # held nowhere else
@@ -343,7 +341,7 @@ def test_a_hold_adds_nothing_to_a_weight_beyond_its_share(foot_model, side):
     assert abs(rising) == pytest.approx(0.9 * 4.0)
 
 
-def test_an_arm_that_floated_is_held_where_it_is_then(law):
+def test_an_arm_that_floated_is_held_at_its_new_pose(law):
     law.enter(ArmState.HOLD, reading(0.0))
     law.enter(ArmState.FLOAT, reading(1.0))
     there = DOWN + np.array([0.1, -0.1, 0.1, 0.1, -0.1, 0.1, 0.0])
@@ -352,7 +350,7 @@ def test_an_arm_that_floated_is_held_where_it_is_then(law):
     assert tau[:6] == pytest.approx(gravity[:6], abs=1e-9)
 
 
-def test_a_move_later_than_the_start_of_the_clock_goes_on_the_same(law):
+def test_a_move_does_not_depend_on_the_clock_origin(law):
     law.enter(ArmState.HOLD, reading(3.0))
     law.move_to(DOWN, 0.5, reading(3.0))
     sagged = DOWN.copy()
@@ -362,7 +360,7 @@ def test_a_move_later_than_the_start_of_the_clock_goes_on_the_same(law):
     assert law.torque(reading(4.0, q=sagged))[0] == pytest.approx(before, abs=1e-9)
 
 
-def test_a_move_in_place_of_another_begins_on_its_way(law):
+def test_a_replacing_move_begins_at_the_present_reference(law):
     """Half-way of a long move another one begins: the goal of the PD does not jump."""
     goal = DOWN + np.array([0, 0, 0, 0.4, 0, 0, 0])
     law.enter(ArmState.HOLD, reading(3.0))
@@ -377,15 +375,13 @@ def test_a_move_in_place_of_another_begins_on_its_way(law):
 
 
 @pytest.mark.parametrize(("state", "offset"), [("HOLD", 0.065), ("FLOAT", 0.5)])
-def test_joint_7_stays_where_a_person_turns_it_in_hold_and_not_in_a_trial(
-    law, state, offset
-):
+def test_joint_7_follows_a_person_in_hold_but_not_in_a_trial(law, state, offset):
     law.enter(ArmState[state], reading(0.0))
     law.torque(reading(9.0, q=moved(0.5)))
     assert law.joint7_offset(reading(9.0, q=moved(0.5))) == pytest.approx(offset)
 
 
-def test_a_hold_in_the_middle_of_a_move_begins_with_the_torque_of_the_move(law):
+def test_a_hold_during_a_move_begins_with_the_torque_of_the_move(law):
     """The PD of the move pulls back by 1 mrad; its goal is far away."""
     goal = DOWN + np.array([0, 0, 0, 0.4, 0, 0, 0])
     law.enter(ArmState.HOLD, reading(3.0))

@@ -60,19 +60,19 @@ def turning(joint, reach, cycles=200):
 
 @pytest.mark.parametrize("joint", range(6))
 @pytest.mark.parametrize("way", [1.0, -1.0])
-def test_a_joint_that_turns_gets_its_share_in_the_sense_of_motion(joint, way):
+def test_a_turning_joint_is_compensated_in_the_direction_of_motion(joint, way):
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
     tau = after(compensation, turning(joint, way * 0.3))[-1]
     whole = joint_coulomb(CONSTANTS, TRUE.coulomb)[joint]
     assert tau[joint] == pytest.approx(way * 0.7 * whole, rel=1e-3)
 
 
-def test_an_arm_that_never_moved_gets_nothing():
+def test_an_arm_that_never_moved_is_not_compensated():
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.8)
     assert not after(compensation, np.zeros((500, 7))).any()
 
 
-def test_one_count_to_and_fro_gets_next_to_nothing():
+def test_one_count_of_jitter_is_hardly_compensated():
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.8)
     angles = np.zeros((500, 7))
     angles[::2] = 2.0 * np.pi / COUNTS
@@ -80,7 +80,7 @@ def test_one_count_to_and_fro_gets_next_to_nothing():
     assert np.all(tau < 0.05 * joint_coulomb(CONSTANTS, TRUE.coulomb))
 
 
-def test_what_a_turned_joint_gets_stays_while_it_rests():
+def test_compensation_persists_while_a_turned_joint_rests():
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
     angles = turning(1, 0.3)
     moving = after(compensation, angles)[-1]
@@ -89,24 +89,24 @@ def test_what_a_turned_joint_gets_stays_while_it_rests():
 
 
 @pytest.mark.parametrize("share", [-0.01, 0.81, float("nan")])
-def test_shares_that_could_move_the_arm_are_refused(share):
+def test_compensation_shares_that_could_move_the_arm_are_refused(share):
     with pytest.raises(ValueError, match=r"share .* is outside 0\.\.0\.8"):
         FrictionCompensation(CONSTANTS, KNOWN, share)
 
 
-def test_a_share_of_nothing_takes_nothing_off():
+def test_a_share_of_zero_does_not_compensate():
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.0)
     assert not after(compensation, turning(1, 0.3)).any()
 
 
-def test_what_is_badly_known_is_compensated_less():
+def test_uncertain_friction_is_compensated_less():
     doubtful = replace(KNOWN, error=np.full(7, 0.5))
     tau = after(FrictionCompensation(CONSTANTS, doubtful, 0.8), turning(1, 0.3))[-1]
     whole = joint_coulomb(CONSTANTS, TRUE.coulomb)[1]
     assert tau[1] * (1.0 + 0.5) <= 0.9 * whole * (1.0 + 1e-9)
 
 
-def test_the_known_part_lies_below_what_rubs_anywhere_and_either_way():
+def test_the_known_friction_is_below_the_true_friction_everywhere():
     friction = replace(
         TRUE,
         asymmetry=0.1 * TRUE.coulomb,
@@ -123,7 +123,7 @@ def test_the_known_part_lies_below_what_rubs_anywhere_and_either_way():
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0, 2.0])
-def test_a_motor_that_bears_less_gets_less_as_its_friction_does(share):
+def test_a_less_loaded_motor_is_compensated_less(share):
     at = np.abs(np.linalg.inv(CONSTANTS.j2mp).T @ np.array([0, 20.0, 0, 0, 0, 0, 0]))
     friction = replace(TRUE, load=np.full(7, 0.04), load_at=at)
     known = friction_lower_bound(friction, NOTHING, NOTHING)
@@ -138,14 +138,14 @@ def test_a_motor_that_bears_less_gets_less_as_its_friction_does(share):
         assert tau[1] == pytest.approx(0.7 * joint_coulomb(CONSTANTS, rubs)[1])
 
 
-def test_a_friction_that_may_be_none_is_not_compensated():
+def test_friction_that_may_be_zero_is_not_compensated():
     known = friction_lower_bound(TRUE, TRUE.coulomb, NOTHING)
     assert not known.forward.any()
     assert not known.backward.any()
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_random_ways_never_gain_energy_at_a_fifth_too_much(seed):
+def test_overcompensated_random_motion_never_gains_energy(seed):
     """Work of compensation and of true friction over ways that end where they began.
 
     The margin is what the compensation's own bristles hold.
@@ -176,7 +176,7 @@ def test_random_ways_never_gain_energy_at_a_fifth_too_much(seed):
 
 
 @pytest.mark.parametrize("state", [ArmState.HOLD, ArmState.DAMP, ArmState.IDLE])
-def test_leaving_float_lets_it_fade_within_a_tenth_of_a_second(foot_model, state):
+def test_compensation_fades_after_leaving_float(foot_model, state):
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
     law = FootController(foot_model, 0.0, friction=compensation)
     law.enter(ArmState.FLOAT, reading(0, NOTHING))
@@ -195,7 +195,7 @@ def test_leaving_float_lets_it_fade_within_a_tenth_of_a_second(foot_model, state
 
 
 @pytest.mark.parametrize("way", [-1.0, 1.0])
-def test_what_fades_in_a_hold_leaves_it_its_share_of_the_limit(foot_model, way):
+def test_fading_compensation_leaves_a_hold_its_torque_limit(foot_model, way):
     """Joint 1, which bears no weight: nine tenths of 1 N m, less than is pushed."""
     walls = Walls(
         tuple(CONSTANTS.q_lower), tuple(CONSTANTS.q_upper), (1.0,) * 7, (0.0,) * 7
@@ -212,7 +212,7 @@ def test_what_fades_in_a_hold_leaves_it_its_share_of_the_limit(foot_model, way):
     assert way * tau[0] == pytest.approx(0.9)
 
 
-def test_joint_7_is_left_to_its_lock(foot_model):
+def test_joint_7_is_not_compensated(foot_model):
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
     law = FootController(foot_model, 0.0, friction=compensation)
     law.enter(ArmState.FLOAT, reading(0, NOTHING))
@@ -221,7 +221,7 @@ def test_joint_7_is_left_to_its_lock(foot_model):
     assert tau[6] == gravity[6]
 
 
-def test_it_ends_inside_a_soft_wall(foot_model):
+def test_compensation_ends_inside_a_soft_wall(foot_model):
     upper = CONSTANTS.q_upper.copy()
     upper[1] = POSE[1] + 0.05  # 50 mrad inside its wall
     walls = Walls(
@@ -239,7 +239,7 @@ def test_it_ends_inside_a_soft_wall(foot_model):
     assert tau[1] == 0.0
 
 
-def test_a_motor_that_swings_as_no_hand_does_ends_it_for_good():
+def test_oscillation_too_fast_for_a_hand_disables_compensation():
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.8)
     cycles = np.arange(1000)
     angles = np.zeros((1000, 7))
@@ -249,7 +249,7 @@ def test_a_motor_that_swings_as_no_hand_does_ends_it_for_good():
     assert not after(compensation, turning(1, 0.3), 2000)[-1].any()
 
 
-def test_a_hand_that_shakes_the_arm_twice_a_second_does_not_end_it():
+def test_shaking_by_hand_does_not_disable_compensation():
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.8)
     cycles = np.arange(2500)
     angles = np.zeros((2500, 7))
@@ -258,7 +258,7 @@ def test_a_hand_that_shakes_the_arm_twice_a_second_does_not_end_it():
     assert compensation.swung_motor == 0
 
 
-def test_a_motor_that_does_not_answer_goes_no_step():
+def test_a_silent_motor_makes_no_step():
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
     angles = turning(1, 0.3)
     before = after(compensation, angles)[-1]
@@ -276,7 +276,7 @@ def of_motors(tau):
 
 @pytest.mark.parametrize("motor", range(7))
 @pytest.mark.parametrize("way", [-1.0, 1.0])
-def test_a_bristle_bends_as_far_as_its_motor_turned(motor, way):
+def test_a_bristle_deflects_by_the_motor_travel(motor, way):
     angles = np.zeros((2, 7))
     angles[1, motor] = way * 0.5 * REACH[motor] * largest_motor_ratios(CONSTANTS)[motor]
     tau = after(FrictionCompensation(CONSTANTS, KNOWN, 0.7), angles)[-1]
@@ -290,7 +290,7 @@ def test_a_bristle_bends_as_far_as_its_motor_turned(motor, way):
 
 
 @pytest.mark.parametrize("way", [-1.0, 1.0])
-def test_a_jump_of_a_motor_bends_its_bristle_once(way):
+def test_a_motor_jump_deflects_its_bristle_once(way):
     angles = np.zeros((2, 7))
     angles[1, 1] = way * 3.0 * REACH[1] * largest_motor_ratios(CONSTANTS)[1]
     tau = after(FrictionCompensation(CONSTANTS, KNOWN, 0.7), angles)[-1]
@@ -299,7 +299,7 @@ def test_a_jump_of_a_motor_bends_its_bristle_once(way):
 
 
 @pytest.mark.parametrize("way", [-1.0, 1.0])
-def test_each_sense_of_motion_has_its_own_friction(way):
+def test_each_direction_of_motion_has_its_own_friction(way):
     known = replace(KNOWN, forward=TRUE.coulomb, backward=0.5 * TRUE.coulomb)
     angles = np.zeros((2, 7))
     angles[1, 3] = way * 3.0 * REACH[3] * largest_motor_ratios(CONSTANTS)[3]
@@ -312,7 +312,7 @@ def test_each_sense_of_motion_has_its_own_friction(way):
 @pytest.mark.parametrize(
     ("depth", "left"), [(0.0, 1.0), (0.005, 0.75), (-0.01, 0.5), (0.02, 0.0)]
 )
-def test_it_fades_over_the_first_20_milliradians_of_a_wall(depth, left):
+def test_compensation_fades_over_the_outer_part_of_a_wall(depth, left):
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
     whole = after(compensation, turning(1, 0.3))[-1]
     inside = np.zeros(7)
@@ -326,7 +326,7 @@ def test_it_fades_over_the_first_20_milliradians_of_a_wall(depth, left):
 @pytest.mark.parametrize(
     ("turns", "gap", "is_over"), [(11, 40, False), (12, 45, True), (12, 46, False)]
 )
-def test_twelve_turns_within_a_second_are_a_swing(turns, gap, is_over):
+def test_fast_repeated_reversals_are_oscillation(turns, gap, is_over):
     """A bristle goes to its other end every `gap` cycles of 2 ms."""
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
     end = 3.0 * REACH[2] * largest_motor_ratios(CONSTANTS)[2]
@@ -339,7 +339,7 @@ def test_twelve_turns_within_a_second_are_a_swing(turns, gap, is_over):
     assert compensation.metadata()["friction:swung_motor"] == str(3 * is_over)
 
 
-def test_what_a_swinging_motor_got_fades_evenly():
+def test_compensation_of_an_oscillating_motor_fades_evenly():
     """Its twelfth turn ends the compensation; from there it rests."""
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
     end = 3.0 * REACH[2] * largest_motor_ratios(CONSTANTS)[2]
@@ -355,7 +355,7 @@ def test_what_a_swinging_motor_got_fades_evenly():
         assert tau[last + cycles] == pytest.approx(share * tau[last])
 
 
-def test_what_is_left_fades_evenly_for_a_tenth_of_a_second():
+def test_remaining_compensation_fades_evenly():
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
     whole = after(compensation, turning(1, 0.3))[-1]
     compensation.rest(10**9)
@@ -366,7 +366,7 @@ def test_what_is_left_fades_evenly_for_a_tenth_of_a_second():
     assert left[4] is None
 
 
-def test_the_doubt_is_95_percent_and_both_add_as_squares():
+def test_uncertainties_are_combined_in_quadrature():
     known = friction_lower_bound(TRUE, 0.03 * TRUE.coulomb, 0.04 * TRUE.coulomb)
 
     assert known.forward == pytest.approx((1.0 - 1.96 * 0.05) * TRUE.coulomb)
@@ -374,7 +374,7 @@ def test_the_doubt_is_95_percent_and_both_add_as_squares():
     assert known.error == pytest.approx(np.full(7, 1.96 * 0.03))
 
 
-def test_a_bristle_that_is_bent_far_slides_more_and_more():
+def test_a_far_deflected_bristle_slides_progressively():
     """z grows by the step up to 0.7, and by less and less up to 1."""
     way = 0.1 * REACH[1] * largest_motor_ratios(CONSTANTS)[1]
     angles = np.zeros((13, 7))
@@ -390,7 +390,7 @@ def test_a_bristle_that_is_bent_far_slides_more_and_more():
     assert bent == pytest.approx(np.array(z), abs=1.5 * counted)
 
 
-def test_both_motors_of_a_differential_let_go_and_no_other():
+def test_only_both_motors_of_the_differential_release():
     way = turning(0, 0.3) + turning(1, 0.3) + turning(2, 0.3) + turning(3, 0.3)
     free = after(FrictionCompensation(CONSTANTS, KNOWN, 0.7), way)[-1]
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
@@ -402,7 +402,7 @@ def test_both_motors_of_a_differential_let_go_and_no_other():
     assert tau[1:3] == pytest.approx([0.0, 0.0])
 
 
-def test_a_bristle_that_is_bent_one_way_again_and_again_swings_not():
+def test_repeated_one_way_motion_is_not_oscillation():
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
     angles = np.zeros((400, 7))
     back = -REACH[2] * largest_motor_ratios(CONSTANTS)[2]
@@ -412,7 +412,7 @@ def test_a_bristle_that_is_bent_one_way_again_and_again_swings_not():
     assert compensation.swung_motor == 0
 
 
-def test_a_ripple_takes_its_share_of_what_the_load_adds():
+def test_ripple_reduces_the_load_dependent_compensation():
     ripple = replace(
         TRUE,
         load=np.full(7, 0.03),

@@ -14,7 +14,7 @@ ANGLES = st.lists(st.floats(-2.5, 2.5), min_size=7, max_size=7).map(np.array)
 
 
 @given(ANGLES, ANGLES, st.floats(0.1, 2.0), st.floats(0.1, 5.0))
-def test_a_move_starts_and_ends_at_rest_where_it_should(start, goal, speed, acc):
+def test_a_move_starts_and_ends_at_rest_at_its_end_points(start, goal, speed, acc):
     move = JointMove(start, goal, speed, acc)
     for t, where in ((0.0, start), (move.duration, goal), (1e6, goal)):
         q, qd = move.at(t)
@@ -40,7 +40,7 @@ def test_velocity_is_the_derivative_of_position(start, goal, share):
 
 
 @given(ANGLES, ANGLES, st.floats(0.0, 1.0))
-def test_the_line_is_straight(start, goal, share):
+def test_the_path_is_a_straight_line(start, goal, share):
     move = JointMove(start, goal)
     q = move.at(share * move.duration)[0]
     way, whole = q - start, goal - start
@@ -49,7 +49,7 @@ def test_the_line_is_straight(start, goal, share):
         assert way == pytest.approx(way[longest] / whole[longest] * whole, abs=1e-9)
 
 
-def test_a_long_move_takes_length_over_speed_and_one_ramp():
+def test_the_duration_of_a_long_move_is_length_over_speed_plus_a_ramp():
     goal = np.zeros(7)
     goal[3] = 2.0
     assert JointMove(np.zeros(7), goal).duration == pytest.approx(2.0 / 0.5 + 1.0)
@@ -65,7 +65,7 @@ def test_the_pd_part_is_clipped_joint_by_joint():
     )
 
 
-def test_nothing_that_is_in_the_way_is_pressed_harder_than_this():
+def test_an_obstacle_is_pressed_with_a_bounded_force():
     """N m beyond the weight: what a person who holds a joint has to bear."""
     held = joint_pd(np.full(7, 1e6), np.zeros(7), np.ones(7), np.zeros(7))
     assert held.tolist() == [25.0, 20.0, 15.0, 15.0, 5.0, 5.0, 5.0]
@@ -73,7 +73,7 @@ def test_nothing_that_is_in_the_way_is_pressed_harder_than_this():
 
 @pytest.mark.parametrize("length", [0.1, 0.49, 0.51, 2.0])
 @given(share=st.floats(0.0, 1.0))
-def test_a_move_brakes_as_it_began(length, share):
+def test_a_move_decelerates_as_it_accelerates(length, share):
     """Half a radian is the shortest move that reaches the top speed."""
     goal = np.array([length, 0, 0, 0, 0, 0, 0])
     move = JointMove(np.zeros(7), goal)
@@ -84,7 +84,7 @@ def test_a_move_brakes_as_it_began(length, share):
 
 
 @pytest.mark.parametrize(("length", "top"), [(0.1, 0.05**0.5), (0.5, 0.5), (2.0, 0.5)])
-def test_the_speed_half_way_is_all_that_the_length_allows(length, top):
+def test_the_speed_at_midpoint_is_the_highest_the_length_allows(length, top):
     goal = np.array([0, 0, -length, 0, 0, 0, 0])
     move = JointMove(np.zeros(7), goal)
     q, qd = move.at(0.5 * move.duration)
@@ -101,7 +101,7 @@ def test_a_move_begins_with_its_acceleration():
 
 
 @pytest.mark.parametrize("way", [-0.4, 0.4])
-def test_joint_7_turns_at_its_top_speed_once_its_lock_has_let_go(way):
+def test_joint_7_turns_at_its_top_speed_once_its_lock_has_released(way):
     start, goal = np.full(7, 0.1), np.full(7, 0.1)
     goal[3], goal[6] = 1.1, 0.1 + way
     move = JointMove(start, goal, 0.2)
@@ -118,7 +118,7 @@ def test_joint_7_turns_at_its_top_speed_once_its_lock_has_let_go(way):
 
 
 @pytest.mark.parametrize("way", [-0.4, 0.4])
-def test_joint_7_is_at_its_top_speed_within_a_twelfth_of_a_second(way):
+def test_joint_7_reaches_its_top_speed_within_its_ramp(way):
     goal = np.zeros(7)
     goal[6] = way
     side = np.sign(way)

@@ -38,7 +38,7 @@ def bench():
     return bench
 
 
-def test_a_move_reaches_the_law_once(bench):
+def test_a_move_is_passed_to_the_controller_once(bench):
     bench.cycle.move_to(GOAL, 0.4)
     bench.run(3)
     assert bench.law.moves == [(list(GOAL), 0.4)]
@@ -54,20 +54,20 @@ def test_a_move_waits_for_a_complete_reading(bench):
     assert len(bench.law.moves) == 1
 
 
-def test_a_move_that_the_law_refuses_is_a_fault(bench):
+def test_a_move_refused_by_the_controller_is_a_fault(bench):
     bench.law.is_refusing = True
     bench.cycle.move_to(GOAL, 0.4)
     bench.run(2)
     assert bench.reason == Fault.MOVE_REFUSED
 
 
-def test_what_others_report_counts_where_the_guard_is_content(bench):
+def test_an_external_report_counts_if_the_guard_passes(bench):
     bench.cycle.report(verdict_for(Fault.CONSOLE_SILENT))
     bench.run()
     assert bench.reason == Fault.CONSOLE_SILENT
 
 
-def test_what_others_report_hides_nothing_worse(bench):
+def test_an_external_report_hides_no_worse_fault(bench):
     bench.cycle.report(verdict_for(Fault.CONSOLE_SILENT))
     bench.arm.qd = np.full(7, 9.0)
     bench.run()
@@ -84,7 +84,7 @@ def test_a_report_is_obeyed_once(bench):
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_a_move_uses_nine_tenths_of_the_torque_limits_and_no_more(foot_model, side):
+def test_a_move_keeps_a_margin_to_the_torque_limits(foot_model, side):
     constants = foot_model.constants
     walls = SoftWalls(
         Walls(tuple(constants.q_lower), tuple(constants.q_upper), LIMITS, (0.0,) * 7)
@@ -98,7 +98,7 @@ def test_a_move_uses_nine_tenths_of_the_torque_limits_and_no_more(foot_model, si
     assert (used > 0.899).sum() >= 6  # of joint 2 its weight takes some back
 
 
-def test_an_arm_on_its_way_gets_its_weight_alone(foot_model):
+def test_a_move_under_way_gets_gravity_torque_only(foot_model):
     """Where it should be, as fast as it should be, half-way: no error, no torque."""
     law = FootController(foot_model, 0.0)
     law.enter(ArmState.HOLD, reading(0.0))
@@ -116,7 +116,7 @@ STRETCHED = np.array([0.0, 1.2, 0.0, 0.5, 0.0, 0.0, 0.2])
 
 
 @pytest.mark.parametrize("way", [-0.4, 0.4])
-def test_a_weight_alone_turns_no_motor_in_vain(foot_model, way):
+def test_gravity_torque_alone_does_not_flag_a_motor(foot_model, way):
     """Where the move wants the arm nothing pulls it but its weight, which is borne."""
     law = FootController(foot_model, 0.0)
     law.enter(ArmState.HOLD, reading(0.0, q=STRETCHED))
@@ -131,7 +131,7 @@ def test_a_weight_alone_turns_no_motor_in_vain(foot_model, way):
 
 
 @pytest.mark.parametrize("way", [-0.4, 0.4])
-def test_a_joint_that_a_move_pulls_at_beyond_its_weight_is_noticed(foot_model, way):
+def test_a_joint_pulled_by_a_move_beyond_its_weight_is_detected(foot_model, way):
     """Up and down, as soon as the pull moves it whatever the friction."""
     law = FootController(foot_model, 0.0)
     law.enter(ArmState.HOLD, reading(0.0, q=STRETCHED))
@@ -146,7 +146,7 @@ def test_a_joint_that_a_move_pulls_at_beyond_its_weight_is_noticed(foot_model, w
     assert law.stuck_motor() in {2, 3}
 
 
-def test_a_move_names_no_motor_for_what_an_earlier_one_wanted(foot_model):
+def test_a_move_does_not_flag_a_motor_for_an_earlier_move(foot_model):
     """It begins with the torque of a hold that somebody pushes against."""
     law = FootController(foot_model, 0.0)
     law.enter(ArmState.HOLD, reading(0.0))
@@ -164,7 +164,7 @@ def test_a_move_names_no_motor_for_what_an_earlier_one_wanted(foot_model):
 
 
 @pytest.mark.parametrize("stop", ["q_lower", "q_upper"])
-def test_a_move_may_end_at_a_stop_and_not_beyond(foot_model, stop):
+def test_a_move_may_end_at_a_joint_stop_but_not_beyond(foot_model, stop):
     law = FootController(foot_model, 0.0)
     law.enter(ArmState.HOLD, reading(0.0))
     goal = DOWN.copy()

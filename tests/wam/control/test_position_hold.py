@@ -4,14 +4,11 @@ import numpy as np
 import pytest
 
 from acquisition.devices import ArmReading
-from wam.control.position_control import PositionHold
+from wam.control.position_control import GUIDE_SHARE, TORQUE_LIMIT, PositionHold
 from wam.model.constants import load_constants
 
 CONSTANTS = load_constants()
-MOST = np.array([8.0, 12.0, 6.0, 6.0, 1.0, 1.0, 0.0])  # N m, a person pushes the arm
-SOFT = np.array([0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.0]) * CONSTANTS.kp
-HEAVY = np.array([4.0, 3.0, 1.5, 3.0, 2.0, 2.0, 0.0]) * CONSTANTS.kd
-GUIDED = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0]) * CONSTANTS.kd
+SOFT = PositionHold(CONSTANTS).stiffness
 ZERO = np.zeros(7)
 FAR = np.ones(7)  # rad; every spring is at its limit
 
@@ -37,29 +34,35 @@ def held():
     return hold
 
 
-def test_the_springs_are_half_as_stiff_as_those_that_follow_moves(held):
+def test_hold_springs_are_softer_than_those_of_a_move(held):
     assert held.spring(seen(np.full(7, 1e-3))) == pytest.approx(-1e-3 * SOFT)
-    assert held.stiffness == pytest.approx(SOFT)
+    assert (SOFT[:6] > 0.0).all()
+    assert (SOFT[:6] < CONSTANTS.kp[:6]).all()
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_no_spring_gives_more_than_a_person_may_bear(held, side):
-    assert held.spring(seen(side * FAR)) == pytest.approx(-side * MOST)
+def test_no_spring_exceeds_the_torque_acceptable_to_a_person(held, side):
+    assert held.spring(seen(side * FAR)) == pytest.approx(-side * TORQUE_LIMIT)
 
 
-def test_a_guided_arm_has_half_of_it(held):
-    assert held.torque(seen(FAR), is_guided=True) == pytest.approx(-0.5 * MOST)
+def test_a_guided_arm_has_a_reduced_spring_limit(held):
+    assert held.torque(seen(FAR), is_guided=True) == pytest.approx(
+        -GUIDE_SHARE * TORQUE_LIMIT
+    )
 
 
-def test_the_dampers_brake_each_joint_as_its_weight_needs(held):
+def test_a_held_arm_is_damped_more_than_a_guided_one(held):
     qd = np.full(7, 0.5)
-    assert held.torque(seen(qd=qd)) == pytest.approx(-HEAVY * 0.5)
-    assert held.torque(seen(qd=qd), is_guided=True) == pytest.approx(-GUIDED * 0.5)
+    damped = held.torque(seen(qd=qd))
+    guided = held.torque(seen(qd=qd), is_guided=True)
+    assert guided[:6] == pytest.approx(-0.5 * CONSTANTS.kd[:6])
+    assert (damped[:6] < guided[:6]).all()
+    assert held.torque(seen(qd=-0.5 * qd)) == pytest.approx(-0.5 * damped)
 
 
-def test_the_reference_follows_a_joint_that_is_pushed_away(held):
+def test_the_reference_follows_a_pushed_joint(held):
     held.spring(seen(FAR))
-    reach = MOST[:6] / SOFT[:6]
+    reach = TORQUE_LIMIT[:6] / SOFT[:6]
     here = FAR[:6] - reach  # where the springs are without load now
     assert held.spring(seen([*here, 0.0]))[:6] == pytest.approx(np.zeros(6), abs=1e-9)
 
@@ -72,7 +75,7 @@ def test_an_extrapolated_position_drags_no_reference_along(held):
 @pytest.mark.parametrize(
     ("rate", "is_driven"), [(0.05, True), (0.051, False), (-0.2, True)]
 )
-def test_a_spring_drives_no_joint_faster_than_50_mrad_a_second(held, rate, is_driven):
+def test_a_spring_does_not_exceed_its_return_speed(held, rate, is_driven):
     """The joint is below its reference: the spring pushes up."""
     q = np.full(7, -1e-3)
     spring = held.spring(seen(q, np.full(7, rate)))[:6]
@@ -81,18 +84,18 @@ def test_a_spring_drives_no_joint_faster_than_50_mrad_a_second(held, rate, is_dr
         assert held.spring(seen(q))[:6] == pytest.approx(np.zeros(6))
 
 
-def test_a_spring_drives_no_joint_faster_downwards_either(held):
+def test_a_spring_does_not_exceed_its_return_speed_downwards(held):
     q = np.full(7, 1e-3)
     assert (held.spring(seen(q, np.full(7, -0.05)))[:6] < 0.0).all()
     assert held.spring(seen(q, np.full(7, -0.051)))[:6] == pytest.approx(np.zeros(6))
 
 
-def test_arms_that_are_held_stay_where_they_are_held(held):
+def test_held_arms_stay_in_place(held):
     held.begin(FAR)
     assert held.spring(seen(np.full(7, 1e-3))) == pytest.approx(-1e-3 * SOFT)
 
 
-def test_an_arm_that_was_released_is_held_where_it_is_then(held):
+def test_a_released_arm_is_held_at_its_new_pose(held):
     held.release()
     assert held.spring(seen(FAR)) == pytest.approx(ZERO)
     held.begin(FAR)
@@ -103,8 +106,8 @@ def test_an_arm_that_was_released_is_held_where_it_is_then(held):
 def test_a_spring_may_begin_with_a_torque_within_its_limit(wanted, given):
     """`wanted` and `given` are shares of the limits."""
     hold = PositionHold(CONSTANTS)
-    hold.begin(FAR, wanted * MOST)
-    assert hold.spring(seen(FAR)) == pytest.approx(given * MOST)
+    hold.begin(FAR, wanted * TORQUE_LIMIT)
+    assert hold.spring(seen(FAR)) == pytest.approx(given * TORQUE_LIMIT)
 
 
 def test_joint_7_has_no_spring_and_no_damper(held):

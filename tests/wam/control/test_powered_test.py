@@ -97,7 +97,7 @@ def test_kinetic_energy_within_its_limit_passes_and_beyond_is_named():
 
 @pytest.mark.parametrize("joint", range(1, 8))
 @pytest.mark.parametrize("sense", [-1.0, 1.0])
-def test_a_ramp_grows_evenly_until_its_joint_has_moved_ahead(sense, joint):
+def test_a_ramp_grows_linearly_until_its_joint_has_moved_forward(sense, joint):
     proof = PoweredTest(
         pushed(PoweredTestKind.RAMP, joint, sense), CONSTANTS, reading()
     )
@@ -114,7 +114,7 @@ def test_a_ramp_grows_evenly_until_its_joint_has_moved_ahead(sense, joint):
 
 
 @pytest.mark.parametrize("sense", [-1.0, 1.0])
-def test_a_lift_goes_up_at_its_speed_waits_and_comes_back(sense):
+def test_a_lift_rises_at_its_speed_pauses_and_returns(sense):
     """A joint that is where the lift wants it is not pulled; one behind it is."""
     proof = PoweredTest(pushed(PoweredTestKind.LIFT, 4, sense), CONSTANTS, reading())
     up_s = LIMITS.lift_travel / LIMITS.lift_speed
@@ -131,7 +131,7 @@ def test_a_lift_goes_up_at_its_speed_waits_and_comes_back(sense):
         assert pull == pytest.approx(sense * 1e-3 * CONSTANTS.kp[3], abs=1e-3)
 
 
-def test_without_power_a_hand_may_move_the_arm_and_the_ramp_waits():
+def test_without_power_the_arm_may_be_moved_and_the_ramp_waits():
     proof = PoweredTest(
         PoweredTestGoal(PoweredTestKind.RAMP, 1, 8.0, 1.0), CONSTANTS, reading()
     )
@@ -140,14 +140,14 @@ def test_without_power_a_hand_may_move_the_arm_and_the_ramp_waits():
     assert proof.torque(reading(1400, j4=-0.5), WEIGHT)[0] == pytest.approx(4.0)
 
 
-def test_gravity_grows_to_the_whole_and_stays():
+def test_gravity_torque_is_ramped_to_its_full_value():
     goal = PoweredTestGoal(PoweredTestKind.GRAVITY, seconds=2.0)
     proof = PoweredTest(goal, CONSTANTS, reading())
     assert proof.torque(reading(1000), WEIGHT) == pytest.approx(WEIGHT / 2)
     assert proof.torque(reading(5000), WEIGHT) == pytest.approx(WEIGHT)
 
 
-def test_a_lift_never_exceeds_its_torque_and_ends_without():
+def test_a_lift_never_exceeds_its_torque_and_ends_at_zero():
     proof = PoweredTest(
         PoweredTestGoal(PoweredTestKind.LIFT, 4, -6.0), CONSTANTS, reading()
     )
@@ -156,13 +156,13 @@ def test_a_lift_never_exceeds_its_torque_and_ends_without():
         assert not proof.torque(reading(ms, j4=-0.01), WEIGHT).any()
 
 
-def test_a_ramp_to_no_torque_pushes_nothing():
+def test_a_ramp_to_zero_torque_gives_none():
     proof = PoweredTest(PoweredTestGoal(PoweredTestKind.RAMP, 2), CONSTANTS, reading())
     for way in (-0.02, 0.0, 0.02):
         assert not proof.torque(reading(500, j2=way), WEIGHT).any()
 
 
-def test_a_lift_is_damped_and_pulls_either_way_with_no_more_than_its_torque():
+def test_a_lift_is_damped_and_clipped_in_both_directions():
     proof = PoweredTest(
         PoweredTestGoal(PoweredTestKind.LIFT, 4, 5.0), CONSTANTS, reading()
     )
@@ -175,9 +175,7 @@ def test_a_lift_is_damped_and_pulls_either_way_with_no_more_than_its_torque():
 
 @pytest.mark.parametrize(("joint", "other"), PARTNERS.items())
 @pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_the_partner_of_a_lifted_joint_is_kept_by_twice_its_friction(
-    side, joint, other
-):
+def test_the_partner_of_a_lifted_joint_is_held_within_its_limit(side, joint, other):
     proof = PoweredTest(
         PoweredTestGoal(PoweredTestKind.LIFT, joint, 1.0), CONSTANTS, reading()
     )
@@ -191,7 +189,7 @@ def test_the_partner_of_a_lifted_joint_is_kept_by_twice_its_friction(
 
 
 @pytest.mark.parametrize("kind", PoweredTestKind)
-def test_a_position_that_cannot_be_true_gets_no_torque(kind):
+def test_an_implausible_position_gets_no_torque(kind):
     proof = PoweredTest(
         PoweredTestGoal(kind, 2, 5.0, seconds=0.3), CONSTANTS, reading()
     )
@@ -199,7 +197,7 @@ def test_a_position_that_cannot_be_true_gets_no_torque(kind):
     assert not proof.torque(jumped, WEIGHT).any()
 
 
-def test_at_rest_nothing_is_pushed():
+def test_a_rest_test_gives_no_torque():
     proof = PoweredTest(PoweredTestGoal(PoweredTestKind.REST), CONSTANTS, reading())
     assert not proof.torque(reading(900, j2=0.01), WEIGHT).any()
 
@@ -213,7 +211,7 @@ def test_at_rest_nothing_is_pushed():
         PoweredTestGoal(PoweredTestKind.LIFT, 7, 1.0),
     ],
 )
-def test_the_widest_goals_are_proofs(goal):
+def test_goals_at_their_limits_are_accepted(goal):
     assert PoweredTest(goal, CONSTANTS, reading()).goal == goal
 
 
@@ -231,18 +229,18 @@ def test_the_widest_goals_are_proofs(goal):
         PoweredTestGoal(PoweredTestKind.GRAVITY, seconds=0.0),
     ],
 )
-def test_what_is_no_proof_is_refused(goal):
+def test_invalid_goals_are_refused(goal):
     with pytest.raises(ValueError, match=r"no joint|is not a valid proof"):
         PoweredTest(goal, CONSTANTS, reading())
 
 
-def test_a_goal_says_what_is_given_in_four_numbers():
+def test_a_goal_is_encoded_with_defaults():
     """With no joint and no torque, in a second, where nothing else is said."""
     wanted = [(float(number), 0.0, 0.0, 1.0) for number in range(5)]
     assert [PoweredTestGoal(kind).values for kind in PoweredTestKind] == wanted
 
 
-def test_a_goal_survives_its_way_through_the_commands():
+def test_a_goal_round_trips_through_a_command():
     goal = PoweredTestGoal(PoweredTestKind.LIFT, 6, -1.5, 2.0)
     assert PoweredTestGoal.of((*goal.values, 0.0)) == goal
     assert PoweredTestGoal.of(replace(goal, joint=5).values) != goal

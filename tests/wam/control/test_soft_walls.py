@@ -50,12 +50,12 @@ def at(angle, joint=3):
     return q
 
 
-def test_nothing_pushes_in_the_middle():
+def test_no_wall_acts_in_mid_range():
     assert not pushed(armed(), np.full(7, 1.0), np.full(7, 3.0)).any()
 
 
 @pytest.mark.parametrize(("stop", "sign"), [(-1.0, 1.0), (2.0, -1.0)])
-def test_the_spring_pushes_inward_and_gives_half_the_limit_at_the_stop(stop, sign):
+def test_the_spring_pushes_inward_up_to_its_share_of_the_limit(stop, sign):
     tau = pushed(armed(), at(stop))
     assert tau[3] == pytest.approx(sign * LIMIT / 2)
     assert not np.delete(tau, 3).any()
@@ -67,7 +67,7 @@ def test_the_spring_begins_from_zero(stop, sign):
     assert 0.0 < sign * tau[3] < 1e-3
 
 
-def test_motion_into_the_wall_is_braked_and_motion_out_is_not():
+def test_motion_into_the_wall_is_damped_and_motion_out_is_not():
     q, qd = at(1.95), np.zeros(7)
     still = pushed(armed(), q)[3]
     qd[3] = 0.5
@@ -76,7 +76,7 @@ def test_motion_into_the_wall_is_braked_and_motion_out_is_not():
     assert pushed(armed(), q, qd)[3] == still
 
 
-def test_a_joint_that_starts_in_its_wall_is_not_thrown_out():
+def test_a_joint_starting_inside_a_wall_is_not_ejected():
     walls = SoftWalls(WALLS)
     assert not pushed(walls, at(2.05)).any()
     assert not pushed(walls, at(1.92)).any()
@@ -90,7 +90,7 @@ def test_an_extrapolated_position_arms_nothing():
     assert pushed(walls, at(1.95))[3] == 0.0
 
 
-def test_home_on_two_stops_gets_no_kick_and_its_walls_come_later():
+def test_at_home_on_the_stops_walls_arm_later_without_a_kick():
     constants = load_constants()
     walls = SoftWalls(
         Walls(
@@ -119,11 +119,11 @@ def test_each_joint_arms_its_own_walls():
 
 
 @pytest.mark.parametrize(("tau", "expected"), [(-4.0, -9.0), (-8.0, -9.5), (4.0, -1.0)])
-def test_a_wall_leaves_the_joint_within_its_limit(tau, expected):
+def test_the_total_torque_in_a_wall_stays_within_the_limit(tau, expected):
     assert pushed(armed(), at(2.0), tau=at(tau))[3] == pytest.approx(expected)
 
 
-def test_a_wall_takes_nothing_from_a_torque_beyond_the_limit():
+def test_a_wall_does_not_reduce_a_torque_beyond_the_limit():
     assert pushed(armed(), at(2.0), tau=at(-12.0))[3] == -12.0
 
 
@@ -155,7 +155,7 @@ def test_no_trial_of_the_shipped_matrix_touches_a_wall(foot_model):
                 assert (q < constants.q_upper - DEPTH).all()
 
 
-def test_the_damper_of_a_wall_is_as_strong_as_it_was_chosen():
+def test_the_damper_of_a_wall_has_its_configured_gain():
     """At the stop all of the damper is there, half-way half of it."""
     damping, speed = 3.0, -0.4
     walls = SoftWalls(Walls((-1.0,) * 7, (1.0,) * 7, (1e3,) * 7, (damping,) * 7))
@@ -167,7 +167,7 @@ def test_the_damper_of_a_wall_is_as_strong_as_it_was_chosen():
         assert braked == pytest.approx(-share * damping * speed)
 
 
-def test_beyond_the_stop_the_damper_grows_no_more():
+def test_the_damper_is_constant_beyond_the_stop():
     damping, speed = 3.0, -0.4
     walls = SoftWalls(Walls((-1.0,) * 7, (1.0,) * 7, (1e3,) * 7, (damping,) * 7))
     pushed(walls, np.zeros(7))
@@ -183,7 +183,7 @@ def test_no_wall_is_armed_at_first(joint):
 
 
 @pytest.mark.parametrize(("stop", "sign"), [(-1.0, 1.0), (2.0, -1.0)])
-def test_the_slightest_touch_of_a_wall_is_pushed_back(stop, sign):
+def test_the_slightest_penetration_of_a_wall_is_resisted(stop, sign):
     inside = stop + sign * (DEPTH - 0.002)
     assert pushed(armed(), at(inside))[3] == pytest.approx(sign * LIMIT / 0.2 * 0.002)
 

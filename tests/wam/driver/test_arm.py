@@ -14,6 +14,7 @@ from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
 from wam.bus.frames import MOTOR_NODES, decode_torques
 from wam.driver.arm import WamArm
+from wam.driver.home import HOME_LIMIT
 from wam.driver.settings import ArmSettings
 
 HOME = np.array([0.0, -2.0, 0.0, 3.13, 0.0, 0.0, 0.0])
@@ -76,7 +77,7 @@ def test_sleeping_pucks_are_woken_in_turn_and_left_alone_while_they_boot():
 
 
 @pytest.mark.parametrize("vers", [33, 61, 200])
-def test_the_first_positions_are_no_speed_fault_to_the_module(vers):
+def test_the_first_positions_cause_no_speed_fault_of_the_module(vers):
     number = {33: 102, 61: 55, 200: 55}[vers]  # of IFAULT
     rig = Rig(NetworkOptions(safety_vers=vers), HOME_COUNTS)
     arm = WamArm(rig.link, rig.clock)
@@ -180,8 +181,8 @@ def test_a_reading_has_seven_joints_within_its_cycle():
     assert frames(rig)[0] == GET_P
 
 
-@pytest.mark.parametrize("silent", range(8))
-def test_a_reading_tells_which_motors_answered_and_when(silent):
+@pytest.mark.parametrize("silent", [0, 1, 4, 7])
+def test_a_reading_states_which_motors_answered_and_when(silent):
     rig, arm = started()
     first = cycle(rig, arm)
     rig.network.silence(silent or 10)
@@ -289,7 +290,7 @@ def test_a_joint_that_returns_has_its_mean_velocity():
     assert reading.qd[6] == pytest.approx(step / 0.002, rel=1e-6)
 
 
-def test_a_joint_silent_for_long_is_taken_to_stand():
+def test_a_joint_silent_for_long_is_taken_to_be_at_rest():
     rig, arm = started()
     moving(rig, arm, 60)
     rig.network.silence(7)
@@ -306,10 +307,13 @@ def test_waiting_for_a_missing_reply_ends_at_the_deadline():
     assert rig.clock.t_ns - begin_ns == 1_500_000
 
 
-@pytest.mark.parametrize(("jump", "is_fresh"), [(195, True), (210, False)])
-def test_a_position_beyond_twice_the_speed_limits_is_not_believed(jump, is_fresh):
+@pytest.mark.parametrize(("share", "is_fresh"), [(0.99, True), (1.01, False)])
+def test_a_position_beyond_the_plausible_speed_is_rejected(share, is_fresh):
     rig, arm = started()
     cycle(rig, arm)
+    settings = ArmSettings()
+    fastest = arm.transmission.fastest_counts(np.array(settings.speed_limits))[2]
+    jump = round(share * (settings.jump_margin * fastest * CYCLE_NS * 1e-9 + 4))
     rig.motors.position[2] += jump
     reading = cycle(rig, arm)
     assert bool(reading.fresh & 0b100) is is_fresh
@@ -318,7 +322,7 @@ def test_a_position_beyond_twice_the_speed_limits_is_not_believed(jump, is_fresh
     assert reading.counts[2] == moved
 
 
-def test_positions_after_a_pause_are_taken_as_they_are():
+def test_positions_after_a_pause_are_accepted():
     rig, arm = started()
     cycle(rig, arm)
     rig.motors.position[2] += 5000
@@ -337,7 +341,7 @@ def test_stale_replies_are_drained_and_counted():
     assert reading.counts[0] == HOME_COUNTS[0] + 10
 
 
-def test_a_malformed_reply_is_a_missing_one(monkeypatch):
+def test_a_malformed_reply_counts_as_missing(monkeypatch):
     rig, arm = started()
     receive = rig.link.receive
 
@@ -356,7 +360,7 @@ def broken(*_):
     raise LinkError("gone")
 
 
-def test_a_dead_bus_is_missing_replies_to_the_reader():
+def test_a_dead_bus_reads_as_missing_replies():
     rig, arm = started()
     rig.link.send = broken
     reading = arm.read(rig.clock.t_ns)
@@ -381,7 +385,7 @@ def test_torques_the_bus_refused_are_not_reported_as_sent():
     assert arm.send(2 * TAU, ZERO) == pytest.approx(first, abs=1e-12)
 
 
-def test_safety_mode_is_asked_once_in_25_cycles():
+def test_safety_mode_is_polled_at_its_period():
     rig, arm = started()
     for _ in range(100):
         cycle(rig, arm, ZERO)
@@ -430,7 +434,7 @@ def lose_questions(rig, count):
 
 @pytest.mark.parametrize("lost", [0, 1, 2])
 @pytest.mark.parametrize("phase", [1, 2, 13, 24, 25, 26])
-def test_an_e_stop_is_known_within_four_incomplete_cycles(phase, lost):
+def test_an_e_stop_is_detected_within_a_few_incomplete_cycles(phase, lost):
     rig, arm = started()
     rig.network.pendant("activate")
     for _ in range(phase):
@@ -501,7 +505,7 @@ def test_without_confirmation_no_zero_torque_is_sent():
     assert arm.safety_mode() is SafetyMode.UNKNOWN
 
 
-def test_idle_and_close_may_be_called_again():
+def test_idle_and_close_are_idempotent():
     _, arm = started()
     assert arm.idle()
     assert arm.idle()
@@ -510,7 +514,7 @@ def test_idle_and_close_may_be_called_again():
     assert arm.idle()
 
 
-def test_idle_on_a_dead_bus_says_no_and_does_not_raise():
+def test_idle_on_a_dead_bus_is_unconfirmed_and_does_not_raise():
     rig, arm = started()
     rig.link.send = broken
     assert not arm.idle()
@@ -545,7 +549,7 @@ def test_positions_are_not_defined_while_active():
     assert not any(data[0] == 0xB0 for _, data in frames(rig))
 
 
-def test_a_puck_that_keeps_its_positions_to_itself_fails_the_start():
+def test_a_puck_that_withholds_its_position_fails_the_start():
     rig = Rig()
     arm = WamArm(rig.link, rig.clock)
     send = rig.link.send
@@ -578,7 +582,7 @@ def test_an_arm_that_is_only_listened_to_is_braked_by_its_own_module():
 
 
 @pytest.mark.parametrize("node", [0, 3, 8, 20, 31])
-def test_another_master_is_told_whatever_node_it_calls_itself(node):
+def test_another_master_is_reported_whatever_its_node(node):
     rig, arm = started(NetworkOptions(heartbeat_ns=10_000_000_000))
     rig.network.pendant("activate")
     cycle(rig, arm, TAU)
@@ -589,11 +593,11 @@ def test_another_master_is_told_whatever_node_it_calls_itself(node):
     assert cycle(rig, arm, TAU).foreign_id == 0x401 | node << 5
 
 
-@pytest.mark.parametrize("joint", range(7))
-@pytest.mark.parametrize(("turned", "is_taken"), [(0.028, True), (0.032, False)])
-def test_an_arm_that_moves_while_it_is_zeroed_is_refused_by_the_joint(
-    joint, turned, is_taken
-):
+@pytest.mark.parametrize("joint", [0, 2, 5, 6])
+@pytest.mark.parametrize(
+    ("turned", "is_taken"), [(0.99 * HOME_LIMIT, True), (1.01 * HOME_LIMIT, False)]
+)
+def test_zeroing_a_moving_arm_is_refused_with_the_joint(joint, turned, is_taken):
     rig, arm = started(NetworkOptions(is_zeroed=False), counts=(500,) * 7)
     motors = arm.transmission.counts(np.eye(7)[joint] * turned)
     send = rig.link.send
@@ -644,7 +648,7 @@ def test_a_module_that_says_idle_is_not_believed_while_positions_go_on():
     assert arm.safety_mode() is not SafetyMode.IDLE
 
 
-def test_an_arm_without_an_answer_of_its_puck_is_idle_as_the_module_says():
+def test_without_a_reply_of_its_puck_the_module_decides_idle():
     rig, arm = started()
     rig.network.pendant("activate")
     cycle(rig, arm, TAU)
@@ -652,7 +656,7 @@ def test_an_arm_without_an_answer_of_its_puck_is_idle_as_the_module_says():
     assert arm.idle() is True
 
 
-def test_each_cycle_of_a_dead_bus_counts_once_while_it_is_only_listened_to():
+def test_each_cycle_of_a_dead_bus_counts_once_while_listening():
     rig, arm = started()
     rig.link.receive = broken
     for _ in range(3):

@@ -52,7 +52,7 @@ def driven():
     return Driven()
 
 
-def test_pucks_that_do_as_they_are_told_are_not_accused(driven):
+def test_obedient_pucks_are_not_reported(driven):
     network = driven.rig.network
     for press in ("idle", "activate", "estop"):
         assert driven.run(700) == 700
@@ -60,12 +60,12 @@ def test_pucks_that_do_as_they_are_told_are_not_accused(driven):
     assert driven.run(200) == 200
 
 
-def test_an_arm_that_waits_for_its_activation_is_not_accused():
+def test_an_arm_awaiting_activation_is_not_reported():
     waiting = Driven(is_active=False)
     assert waiting.run(500) == 500
 
 
-def test_single_torque_frames_that_are_lost_accuse_nobody(driven):
+def test_single_lost_torque_frames_are_not_reported(driven):
     rng = np.random.default_rng(1)
     groups = [group_id(group) for group in GROUPS]
     driven.rig.network.faults.lose_from_host(
@@ -74,7 +74,7 @@ def test_single_torque_frames_that_are_lost_accuse_nobody(driven):
     assert driven.run(3000) == 3000
 
 
-def test_answers_that_are_lost_accuse_nobody(driven):
+def test_lost_replies_are_not_reported_as_disobedience(driven):
     for node in MOTOR_NODES:
         driven.rig.network.faults.lose_from_host(
             lambda can_id, data, node=node: can_id == node and len(data) == 1
@@ -83,14 +83,14 @@ def test_answers_that_are_lost_accuse_nobody(driven):
 
 
 @pytest.mark.parametrize("node", MOTOR_NODES)
-def test_a_puck_that_leaves_torque_mode_is_told(driven, node):
+def test_a_puck_that_leaves_torque_mode_is_reported(driven, node):
     driven.rig.network.lose_mode(node)
     assert driven.run(PERIODS) < PERIODS
     assert driven.told == MotorChange(node, "MODE", PuckMode.TORQUE, PuckMode.IDLE)
 
 
 @pytest.mark.parametrize("group", GROUPS)
-def test_torques_that_reach_nobody_are_told(driven, group):
+def test_torques_that_reach_no_puck_are_reported(driven, group):
     lost = group_id(group)
     driven.rig.network.faults.lose_from_host(lambda can_id, _: can_id == lost)
     assert driven.run(PERIODS) < PERIODS
@@ -100,7 +100,7 @@ def test_torques_that_reach_nobody_are_told(driven, group):
 
 
 @pytest.mark.parametrize("node", MOTOR_NODES)
-def test_a_puck_that_missed_idle_is_idled_by_itself_and_told(driven, node):
+def test_a_puck_that_missed_idle_is_idled_individually_and_reported(driven, node):
     network = driven.rig.network
     network.deafen(node)
     assert driven.arm.idle()

@@ -45,7 +45,9 @@ def arm(rig, listener):
     return arm
 
 
-def test_it_is_asked_once_a_cycle_right_after_the_positions(rig, arm, listener):
+def test_the_companion_is_polled_once_a_cycle_right_after_the_positions(
+    rig, arm, listener
+):
     begin_ns = rig.clock.t_ns
     arm.read(begin_ns)
     assert [(can_id, data) for _, can_id, data in rig.sent[:2]] == [
@@ -55,14 +57,14 @@ def test_it_is_asked_once_a_cycle_right_after_the_positions(rig, arm, listener):
     assert listener.asked == [begin_ns]
 
 
-def test_it_is_not_waited_for(rig, arm, listener):
+def test_the_companion_is_not_waited_for(rig, arm, listener):
     reading = arm.read(rig.clock.t_ns)
     assert reading.is_complete
     assert FORCE not in {can_id for can_id, _ in listener.heard}
     assert rig.clock.t_ns - reading.host_ns < 800_000  # the torque comes at 0.87 ms
 
 
-def test_what_came_after_the_positions_is_heard_in_the_next_cycle(rig, arm, listener):
+def test_replies_after_the_positions_are_read_in_the_next_cycle(rig, arm, listener):
     begin_ns = rig.clock.t_ns
     arm.read(begin_ns)
     rig.clock.sleep_until(begin_ns + CYCLE_NS)
@@ -71,7 +73,7 @@ def test_what_came_after_the_positions_is_heard_in_the_next_cycle(rig, arm, list
     assert heard == [FORCE, TORQUE]
 
 
-def test_it_hears_no_positions(rig, arm, listener):
+def test_the_companion_receives_no_positions(rig, arm, listener):
     for n in range(3):
         rig.clock.sleep_until(rig.clock.t_ns // CYCLE_NS * CYCLE_NS + CYCLE_NS)
         arm.read(rig.clock.t_ns)
@@ -80,7 +82,9 @@ def test_it_hears_no_positions(rig, arm, listener):
     assert not [can_id for can_id, _ in listener.heard if can_id & 0x1F == 3]
 
 
-def test_a_bus_that_refuses_its_question_keeps_the_positions(rig, arm, monkeypatch):
+def test_positions_are_kept_when_the_bus_refuses_the_companions_request(
+    rig, arm, monkeypatch
+):
     send = rig.link.send
 
     def refuse(can_id, data):

@@ -20,17 +20,17 @@ def mech_at(q):
 
 
 @given(st.lists(st.floats(-0.05, 0.05), min_size=7, max_size=7))
-def test_joint_errors_come_back_through_the_cables(q):
+def test_joint_errors_are_recovered_through_the_transmission(q):
     found = home_error(CONSTANTS.j2mp, CTS, mech_at(np.array(q)), NOTED)
     # half a count of each motor, through the differentials
     assert found == pytest.approx(q, abs=1e-4)
 
 
-def test_an_arm_at_the_same_place_has_no_error():
+def test_an_arm_in_the_same_pose_has_no_error():
     assert not home_error(CONSTANTS.j2mp, CTS, NOTED, NOTED).any()
 
 
-def test_a_whole_turn_cannot_be_seen():
+def test_a_whole_turn_is_not_observable():
     q = np.array([2 * np.pi / 42, 0, 0, 0, 0, 0, 0])
     found = home_error(CONSTANTS.j2mp, CTS, mech_at(q), NOTED)
     assert found == pytest.approx(np.zeros(7), abs=1e-4)
@@ -58,7 +58,7 @@ def test_small_errors_pass():
     )  # half a turn of the motor with the highest ratio
 
 
-def test_an_error_of_just_the_limit_passes():
+def test_an_error_at_the_limit_passes():
     check_home(np.full(7, HOME_LIMIT))
     with pytest.raises(PreflightError):
         check_home(np.full(7, HOME_LIMIT + 1e-6))

@@ -29,7 +29,7 @@ def move(estimator, cycles, start=0):
     return [(start + cycles) * STEP] * 7
 
 
-def test_a_new_estimator_stands_at_zero():
+def test_a_new_estimator_is_at_zero():
     transmission = Transmission(load_constants().j2mp, CTS, IPNM)
     estimator = JointEstimator(transmission, ArmSettings())
     assert estimator.counts == [0] * 7
@@ -38,7 +38,7 @@ def test_a_new_estimator_stands_at_zero():
     assert estimator.qd7_raw == 0.0
 
 
-def test_steady_motion_is_seen_with_its_velocity(estimator):
+def test_steady_motion_is_estimated_with_its_velocity(estimator):
     counts = move(estimator, 1000)
     rates = estimator.transmission.joints([STEP / 0.002] * 7)
     assert estimator.q == pytest.approx(estimator.transmission.joints(counts))
@@ -54,7 +54,7 @@ def test_the_filter_of_velocities_has_its_pole(estimator):
     assert estimator.qd == pytest.approx(p / (1.0 + p) * rates)
 
 
-def test_asked_twice_at_one_instant_nothing_is_faster(estimator):
+def test_two_reads_at_one_instant_do_not_change_the_velocity(estimator):
     counts = move(estimator, 50)
     before, raw = estimator.qd.copy(), estimator.qd7_raw
     assert estimator.update(100 * MS, counts) == 0x7F
@@ -67,7 +67,7 @@ def test_asked_twice_at_one_instant_nothing_is_faster(estimator):
     assert estimator.qd7_raw == raw
 
 
-def test_the_raw_velocity_of_joint_7_is_between_replies_and_not_from_a_guess(estimator):
+def test_the_raw_velocity_of_joint_7_uses_replies_and_no_extrapolation(estimator):
     """What was guessed meanwhile, from a filtered velocity, is no motion."""
     move(estimator, 1)
     per_count = estimator.transmission.joints([1] * 7)[6]
@@ -79,21 +79,21 @@ def test_the_raw_velocity_of_joint_7_is_between_replies_and_not_from_a_guess(est
     assert estimator.qd7_raw == pytest.approx(3 * STEP * per_count / 0.004)
 
 
-def test_a_joint_7_that_is_silent_for_long_has_no_raw_velocity(estimator):
+def test_a_silent_joint_7_loses_its_raw_velocity(estimator):
     move(estimator, 10)
     for cycle in range(11, 60):
         estimator.update(cycle * 2 * MS, [None] * 7)
     assert estimator.qd7_raw == 0.0
 
 
-def test_a_joint_7_that_is_not_believed_has_no_raw_velocity(estimator):
+def test_a_rejected_joint_7_has_no_raw_velocity(estimator):
     counts = move(estimator, 10)
     estimator.update(22 * MS, [*counts[:6], counts[6] + 1_000_000])
     assert estimator.jump is not None
     assert estimator.qd7_raw == 0.0
 
 
-def test_missing_replies_are_guessed_for_a_while_from_the_velocity(estimator):
+def test_missing_replies_are_extrapolated_for_a_limited_time(estimator):
     counts = move(estimator, 1000)
     none = [None] * 7
     at = estimator.transmission.joints
@@ -108,7 +108,7 @@ def test_missing_replies_are_guessed_for_a_while_from_the_velocity(estimator):
     assert estimator.q == pytest.approx(last)  # no guess goes on for ever
 
 
-def test_a_false_position_is_named_and_moves_nothing(estimator):
+def test_a_rejected_position_is_named_and_moves_no_joint(estimator):
     counts = move(estimator, 100)
     false = list(counts)
     false[3] += 3000
@@ -121,7 +121,7 @@ def test_a_false_position_is_named_and_moves_nothing(estimator):
     assert estimator.q == pytest.approx(before, abs=1e-6)
 
 
-def test_the_fastest_of_two_jumps_is_named(estimator):
+def test_the_faster_of_two_jumps_is_named(estimator):
     counts = move(estimator, 100)
     false = list(counts)
     false[0], false[6] = counts[0] - 30_000, counts[6] + 3000
@@ -135,7 +135,7 @@ def test_the_fastest_of_two_jumps_is_named(estimator):
 
 
 @pytest.mark.parametrize(("counts", "is_believed"), [(4, True), (5, False)])
-def test_a_motor_may_seem_to_move_by_four_counts_in_no_time(counts, is_believed):
+def test_a_few_counts_of_jitter_are_not_a_jump(counts, is_believed):
     """Two replies of one instant: whatever the speed limit, no way lies between."""
     transmission = Transmission(load_constants().j2mp, CTS, IPNM)
     estimator = JointEstimator(transmission, ArmSettings())

@@ -73,7 +73,7 @@ def true_error(rig, arm):
 
 
 @pytest.mark.parametrize(("asleep", "number"), ROWS)
-def test_no_start_calls_an_arm_zeroed_that_is_not(asleep, number):
+def test_no_start_reports_a_lost_zero_as_zeroed(asleep, number):
     rig, lost = rig_with(ASLEEP[asleep]), LostPositions()
     lose(rig, number)
     for _ in range(2):  # the second start sees all pucks awake
@@ -84,7 +84,7 @@ def test_no_start_calls_an_arm_zeroed_that_is_not(asleep, number):
 
 
 @pytest.mark.parametrize("asleep", ASLEEP)
-def test_a_zeroing_that_is_accepted_is_right_whichever_write_is_lost(asleep):
+def test_an_accepted_zeroing_is_right_whichever_write_is_lost(asleep):
     writes = count_of(ASLEEP[asleep], zeroes=True)
     begin = count_of(ASLEEP[asleep], zeroes=False)
     assert writes - begin >= 8  # seven positions and ZERO
@@ -104,7 +104,7 @@ def test_a_zeroing_that_is_accepted_is_right_whichever_write_is_lost(asleep):
     assert ASLEEP[asleep] == () or accepted < writes - begin
 
 
-def test_a_start_that_ends_while_pucks_boot_leaves_no_arm_that_passes_for_zeroed(
+def test_a_start_that_ends_during_boot_leaves_the_arm_not_zeroed(
     monkeypatch,
 ):
     rig = rig_with((3,))
@@ -122,7 +122,7 @@ def test_a_start_that_ends_while_pucks_boot_leaves_no_arm_that_passes_for_zeroed
     assert not WamArm(rig.link, rig.clock).start().is_zeroed
 
 
-def test_positions_that_were_lost_are_known_on_the_disk_until_they_are_defined(
+def test_lost_positions_are_recorded_on_disk_until_defined(
     tmp_path,
 ):
     path = tmp_path / "positions-lost.txt"
@@ -156,7 +156,7 @@ def test_a_note_that_cannot_be_removed_keeps_the_arm_refused(tmp_path, monkeypat
     assert not WamArm(rig.link, rig.clock, lost=LostPositions(path)).start().is_zeroed
 
 
-def test_a_puck_that_cannot_be_noted_is_not_woken(tmp_path):
+def test_a_puck_is_not_woken_if_the_note_cannot_be_written(tmp_path):
     rig = rig_with((3,))
     lost = LostPositions(tmp_path / "missing" / "positions-lost.txt")
     rig.sent.clear()
@@ -166,7 +166,7 @@ def test_a_puck_that_cannot_be_noted_is_not_woken(tmp_path):
     assert wakes == []
 
 
-def test_a_puck_that_obeys_torques_of_an_idle_arm_is_idled_or_refused():
+def test_a_puck_in_torque_mode_in_an_idle_arm_is_idled_or_refused():
     rig = rig_with(())
     rig.network.pendant("activate")
     rig.network.deafen(4)

@@ -36,14 +36,14 @@ class Bench:
     ("node", "name", "was", "value"),
     [(3, "PIDX", 3, 2), (2, "MT", 4860, 700), (7, "IPNM", 17474, 2700)],
 )
-def test_a_property_that_changes_is_told_with_both_values(node, name, was, value):
+def test_a_changed_property_is_reported_with_both_values(node, name, was, value):
     bench = Bench()
     assert bench.run(10).change is None
     bench.rig.network.set_property(node, name, value)
     assert bench.run(TURN + 50).change == MotorChange(node, name, was, value)
 
 
-def test_the_first_change_is_told_and_stays_though_the_puck_says_otherwise_again():
+def test_the_first_change_stays_reported_after_the_value_reverts():
     bench = Bench()
     bench.rig.network.set_property(2, "MT", 700)
     first = MotorChange(2, "MT", 4860, 700)
@@ -53,7 +53,7 @@ def test_the_first_change_is_told_and_stays_though_the_puck_says_otherwise_again
     assert bench.run(TURN + 50).change == first
 
 
-def test_another_start_begins_anew():
+def test_another_start_resets_the_watch():
     bench = Bench()
     bench.rig.network.set_property(7, "MT", 1400)
     assert bench.run(TURN + 50).change is not None
@@ -62,7 +62,7 @@ def test_another_start_begins_anew():
 
 
 @pytest.mark.parametrize("vers", [65, 128, 200])
-def test_all_are_asked_in_turn_and_none_changes_by_itself(vers):
+def test_all_properties_are_polled_in_turn_without_false_changes(vers):
     bench = Bench(vers=(vers,) * 7)
     assert bench.run(TURN + 100).change is None
     asked = {(i, d) for _, i, d in bench.rig.sent if i in MOTOR_NODES and len(d) == 1}
@@ -71,7 +71,7 @@ def test_all_are_asked_in_turn_and_none_changes_by_itself(vers):
     assert len(asked) == (len(WATCHED) + 4 + 2) * len(MOTOR_NODES)
 
 
-def test_no_cycle_has_two_questions():
+def test_no_cycle_has_two_requests():
     bench = Bench()
     bench.run(TURN)
     nodes = (*MOTOR_NODES, 10)
@@ -83,7 +83,7 @@ def questions(watch, count):
     return {watch.next_question() for _ in range(count)}
 
 
-def test_an_even_number_of_questions_is_asked_in_turn_too():
+def test_an_even_number_of_requests_is_also_polled_in_turn():
     watch = PropertyWatch()
     answers = [dict.fromkeys(WATCHED, 1)] * 6
     watch.begin([*answers, dict.fromkeys(WATCHED[1:], 1)], (200,) * 7)
@@ -91,7 +91,7 @@ def test_an_even_number_of_questions_is_asked_in_turn_too():
     assert len(questions(watch, count)) == count
 
 
-def test_every_start_asks_from_the_first_one_on():
+def test_every_start_polls_from_the_first_property():
     watch = PropertyWatch()
     for _ in range(2):
         watch.begin([dict.fromkeys(WATCHED, 1)] * 7, (200,) * 7)
@@ -99,20 +99,20 @@ def test_every_start_asks_from_the_first_one_on():
         assert nodes == [1, 2, 3, 4, 5, 6, 7, 1, 2]
 
 
-def test_the_only_question_is_asked_again_and_again():
+def test_a_single_property_is_polled_repeatedly():
     watch = PropertyWatch()
     watch.begin([{}] * 6 + [{"MT": 1370}], (200,) * 7)
     assert len(questions(watch, 3)) == 1
 
 
-def test_nothing_is_asked_for_before_a_start_or_of_silent_pucks():
+def test_nothing_is_polled_before_a_start_or_of_silent_pucks():
     watch = PropertyWatch()
     assert watch.next_question() is None
     watch.begin([dict.fromkeys(WATCHED)] * 7, (200,) * 7)
     assert watch.next_question() is None
 
 
-def test_what_a_puck_no_longer_says_is_not_asked_after_another_start():
+def test_a_property_no_longer_answered_is_not_polled_after_a_restart():
     watch = PropertyWatch()
     for count in (7, 6):
         watch.begin([{"MT": 1370}] * count + [{}] * (7 - count), (200,) * 7)

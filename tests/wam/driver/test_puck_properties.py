@@ -49,7 +49,7 @@ def refusal(*changes, **options):
         (5, "ID", 4, "5"),
     ],
 )
-def test_a_puck_of_another_place_or_arm_is_refused(node, name, value, expected):
+def test_a_puck_of_another_position_or_arm_is_refused(node, name, value, expected):
     error = refusal((node, name, value))
     assert error.message == f"{name} of puck {node} is {value}, expected {expected}."
     assert "properties of rig.toml" in error.hint
@@ -64,7 +64,7 @@ def test_nothing_is_sent_to_the_motors_of_a_refused_arm():
     assert not any(can_id in (0x401, 0x402) for _, can_id, _ in rig.sent)
 
 
-def test_what_is_wrong_is_told_together_and_how_to_set_it():
+def test_all_wrong_values_are_reported_together_with_the_remedy():
     error = refusal((3, "PIDX", 2), (2, "MT", 700), (2, "IPNM", 27000))
     assert error.message == (
         "PIDX of puck 3 is 2, expected 3; IPNM of puck 2 is 27000, expected 2430 to "
@@ -73,7 +73,7 @@ def test_what_is_wrong_is_told_together_and_how_to_set_it():
     assert "003#C60003000000 003#9E0046000000, 002#AB00FC120000" in error.hint
 
 
-def test_the_frames_of_the_hint_set_what_is_expected():
+def test_the_frames_in_the_remedy_set_the_expected_value():
     error = refusal((3, "PIDX", 2))
     can_id, data = next(w for w in error.hint.split() if "#C6" in w).split("#")
     rig = Rig(counts=HOME_COUNTS)
@@ -88,7 +88,7 @@ def test_the_frames_of_the_hint_set_what_is_expected():
     ("node", "name", "value"),
     [(7, "MT", 4860), (3, "OTEMP", 120), (4, "VBUS", 41)],
 )
-def test_what_the_host_bounds_or_only_watches_warns(node, name, value):
+def test_properties_the_host_bounds_or_watches_only_warn(node, name, value):
     (warning,) = start([(node, name, value)]).warnings
     assert warning.startswith(f"{name} of puck {node} is {value}, expected ")
 
@@ -118,7 +118,7 @@ def test_pucks_with_one_serial_number_are_a_warning():
     assert "1001 1001 1003" in warning
 
 
-def test_a_property_that_a_puck_does_not_tell_is_a_warning():
+def test_an_unanswered_property_is_a_warning():
     rig = Rig(counts=HOME_COUNTS)
     receive = rig.network.receive
     rig.network.receive = lambda t, i, d: (
@@ -128,14 +128,14 @@ def test_a_property_that_a_puck_does_not_tell_is_a_warning():
     assert warning == "Puck 3 does not answer GET PIDX: it is not compared."
 
 
-def test_what_this_arm_is_known_to_be_goes_before_the_factory():
+def test_values_of_this_arm_take_precedence_over_the_factorys():
     text = "[POLES]\nvalues = [12, 12, 12, 10, 8, 8, 6]\n"
     assert start([(4, "POLES", 10)], text).warnings == ()
     with pytest.raises(UnfitDeviceError, match="POLES of puck 4 is 12, expected 10"):
         start([], text)
 
 
-def test_another_arm_is_known_by_its_serial_numbers():
+def test_another_arm_is_recognised_by_its_serial_numbers():
     text = "[SN]\nvalues = [1001, 1002, 1003, 1004, 1005, 1006, 2007]\n"
     with pytest.raises(UnfitDeviceError, match="SN of puck 7 is 1007, expected 2007"):
         start([], text)
@@ -151,7 +151,7 @@ def test_another_arm_is_known_by_its_serial_numbers():
         ("MT = ", "value"),
     ],
 )
-def test_a_file_that_is_no_table_is_refused_with_its_name(text, words):
+def test_a_file_that_is_not_a_table_is_refused_by_name(text, words):
     with pytest.raises(SettingsError, match=r"ours\.toml is no table") as caught:
         known_table(text, "ours.toml")
     assert words in caught.value.message
@@ -168,7 +168,7 @@ def test_the_shipped_table_holds_the_constants_of_the_model():
     assert compare(shipped_table(), found) == []
 
 
-def test_three_ways_to_set_a_puck_right_are_told_and_no_more():
+def test_the_number_of_remedies_listed_is_limited():
     three = ((3, "PIDX", 2), (6, "PIDX", 1), (3, "GRPB", 2))
     assert "and so on" not in refusal(*three).hint
     error = refusal(*three, (5, "GRPA", 1))
@@ -177,6 +177,6 @@ def test_three_ways_to_set_a_puck_right_are_told_and_no_more():
     assert error.hint.count("#9E") == 3  # each of them is kept by a frame
 
 
-def test_motors_of_one_differential_may_differ_by_two_percent():
+def test_motors_of_one_differential_may_differ_within_the_tolerance():
     assert start([(3, "IPNM", 2646)]).warnings == ()
     assert "IPNM of puck 3 is 2645" in refusal((3, "IPNM", 2645)).message

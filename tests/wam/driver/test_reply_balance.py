@@ -14,7 +14,7 @@ def ask(balance, replies, cycles=1):
 
 
 @pytest.mark.parametrize("behind", [0, 1, 24])
-def test_replies_that_come_late_and_all_at_once_are_not_a_second_sender(behind):
+def test_delayed_replies_in_a_burst_are_not_a_second_sender(behind):
     balance = ReplyBalance()
     ask(balance, 0, cycles=behind)
     balance.replies[0] += behind
@@ -22,7 +22,7 @@ def test_replies_that_come_late_and_all_at_once_are_not_a_second_sender(behind):
     assert balance.doubled() == 0
 
 
-def test_a_frame_that_the_bus_repeats_now_and_then_is_no_second_sender():
+def test_occasional_repeated_frames_are_not_a_second_sender():
     balance = ReplyBalance()
     for _ in range(100):
         ask(balance, 2)
@@ -30,7 +30,7 @@ def test_a_frame_that_the_bus_repeats_now_and_then_is_no_second_sender():
         assert balance.doubled() == 0
 
 
-def test_a_second_sender_is_found_behind_lost_replies():
+def test_a_second_sender_is_detected_despite_lost_replies():
     balance = ReplyBalance()
     ask(balance, 0, cycles=5000)
     ask(balance, 2, cycles=40)

@@ -34,7 +34,7 @@ def test_the_defaults_are_the_power_up_values():
     }
 
 
-def test_limits_are_written_with_the_known_bytes():
+def test_limits_are_written_with_the_golden_bytes():
     rig = Rig()
     start(rig, RAISED)
     assert [data.hex(" ") for _, data in told(rig)][8:] == [
@@ -45,7 +45,7 @@ def test_limits_are_written_with_the_known_bytes():
     ]
 
 
-def test_before_that_each_is_reset_as_after_power_up():
+def test_each_limit_is_reset_to_its_power_up_value_first():
     rig = Rig()
     start(rig, RAISED)
     resets = [data.hex(" ") for _, data in told(rig)][:8]
@@ -56,7 +56,7 @@ def test_before_that_each_is_reset_as_after_power_up():
     ]
 
 
-def test_configuration_frames_are_10_ms_apart():
+def test_configuration_frames_are_spaced():
     rig = Rig()
     start(rig, RAISED)
     times = [t for t, _ in told(rig)]
@@ -64,7 +64,7 @@ def test_configuration_frames_are_10_ms_apart():
     assert min(b - a for a, b in pairwise(times)) >= 10_000_000
 
 
-def test_limits_another_program_left_behind_are_gone():
+def test_limits_left_by_another_program_are_reset():
     rig = Rig()
     rig.link.send(0x00A, encode_set(46, 8192))
     rig.rest(1_000_000)
@@ -76,7 +76,7 @@ def test_limits_another_program_left_behind_are_gone():
     assert [f.data.hex(" ") for f in rig.link.receive()] == ["ae 00 00 10"]
 
 
-def test_a_module_that_keeps_its_limit_is_driven_and_both_values_are_told():
+def test_a_module_that_keeps_its_limit_is_driven_with_both_values_reported():
     rig = Rig()
     receive = rig.network.receive
     set_vl2 = encode_set(46, 6144)
@@ -88,7 +88,7 @@ def test_a_module_that_keeps_its_limit_is_driven_and_both_values_are_told():
 
 
 @pytest.mark.parametrize(("name", "number"), [("VL1", 45), ("TL2", 48)])
-def test_a_module_that_does_not_tell_a_limit_is_driven_with_a_warning(name, number):
+def test_an_unreadable_limit_is_driven_with_a_warning(name, number):
     rig = Rig()
     receive = rig.network.receive
     rig.network.receive = lambda t, i, d: (

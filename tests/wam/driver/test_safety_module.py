@@ -43,12 +43,12 @@ def test_each_monitor_has_its_field(word, fault):
 @pytest.mark.parametrize(
     ("button", "bits"), [("E_STOP", 0), ("ACTIVATE", 1), ("IDLE", 2), ("NONE", 3)]
 )
-def test_the_button_that_is_pressed_is_in_bits_26_and_27(button, bits):
+def test_the_pressed_button_is_read_from_the_word(button, bits):
     word = 0x0D3F1249 & ~(3 << 26) | bits << 26
     assert decode_pendant(word).button.name == button
 
 
-def test_a_warning_is_no_fault():
+def test_a_warning_is_not_a_fault():
     pendant = decode_pendant(0x0D3F1251)
     assert pendant.torque is SafetyLevel.WARNING
     assert pendant.faults == ()
@@ -61,11 +61,11 @@ def test_a_field_that_is_not_one_hot_is_an_error(word):
 
 
 @pytest.mark.parametrize("word", WORDS)
-def test_a_word_survives_both_ways(word):
+def test_a_word_round_trips(word):
     assert encode_pendant(decode_pendant(word)) == word
 
 
-def test_a_mode_nobody_knows_is_unknown():
+def test_an_undefined_mode_is_unknown():
     assert [decode_mode(v) for v in (0, 2, 3, -1)] == [
         *(SafetyMode.E_STOP, SafetyMode.ACTIVE),
         *(SafetyMode.UNKNOWN, SafetyMode.UNKNOWN),
@@ -99,7 +99,7 @@ def test_a_silent_module_is_unknown_after_the_deadline():
     assert rig.clock.t_ns - begin_ns < 80_000_000  # one retry beyond
 
 
-def test_a_silent_module_is_an_error_where_an_answer_is_needed():
+def test_a_silent_module_is_an_error_if_a_reply_is_required():
     rig = Rig()
     rig.network.silence(10)
     with pytest.raises(LinkTimeoutError, match="MODE"):
@@ -131,12 +131,12 @@ class Answers:
 
 
 @pytest.mark.parametrize("value", [3, 5, -1])
-def test_a_mode_that_does_not_exist_is_an_error(value):
+def test_an_undefined_mode_is_an_error(value):
     with pytest.raises(DeviceFaultError, match=f"mode {value}"):
         SafetyModule(Answers(value), None, 200).mode()
 
 
-def test_a_module_that_does_not_take_the_zero_is_an_error():
+def test_a_module_that_rejects_the_zero_is_an_error():
     answers = Answers(0)
     with pytest.raises(DeviceFaultError, match="ZERO"):
         SafetyModule(answers, None, 200).mark_zeroed()

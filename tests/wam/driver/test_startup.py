@@ -40,7 +40,7 @@ def test_a_puck_in_reset_is_waited_for_and_woken():
     assert not info.is_zeroed  # it has lost its position
 
 
-def test_nothing_is_said_while_a_late_device_may_be_booting():
+def test_nothing_is_sent_while_a_late_device_may_be_booting():
     rig = Rig(counts=HOME_COUNTS)
     rig.network.silence(5)
     with pytest.raises(PreflightError):
@@ -62,7 +62,7 @@ def test_a_stopped_arm_is_not_waited_for():
     assert rig.clock.t_ns - before < 500 * MS
 
 
-def test_everything_that_is_missing_is_named_at_once():
+def test_all_missing_devices_are_named_at_once():
     rig = Rig()
     for node in (2, 6, 10):
         rig.network.silence(node)
@@ -73,7 +73,7 @@ def test_everything_that_is_missing_is_named_at_once():
     )
 
 
-def test_an_empty_bus_is_named_as_one():
+def test_an_empty_bus_is_reported_as_empty():
     rig = Rig()
     for node in (*range(1, 8), 10):
         rig.network.silence(node)
@@ -94,7 +94,7 @@ def test_an_arm_of_four_joints_is_recognised():
 
 
 @pytest.mark.parametrize(("poles", "kind"), [(8, "gimbals"), (10, "something unknown")])
-def test_another_wrist_is_refused_by_its_poles(poles, kind):
+def test_another_wrist_is_recognised_by_its_poles_and_refused(poles, kind):
     rig = Rig(NetworkOptions(poles=(12, 12, 12, 12, 8, 8, poles)))
     with pytest.raises(PreflightError) as caught:
         start(rig)
@@ -129,7 +129,7 @@ def test_a_puck_without_a_magnetic_encoder_has_no_absolute_angle():
     assert start(rig).pucks[2].mech is not None
 
 
-def test_the_absolute_angle_outlives_the_zeroing():
+def test_the_absolute_angle_survives_the_zeroing():
     rig = Rig(counts=(100, 200, 300, 400, 500, 600, 700))
     arm = WamArm(rig.link, rig.clock)
     before = [p.mech for p in arm.start().pucks]
@@ -137,7 +137,7 @@ def test_the_absolute_angle_outlives_the_zeroing():
     assert [p.mech for p in arm.start().pucks] == before == list(rig.motors.position)
 
 
-def test_a_node_that_is_no_motor_is_named():
+def test_a_node_that_is_not_a_motor_is_named():
     rig = Rig(counts=HOME_COUNTS)
     rig.network.set_property(4, "ROLE", int(PuckRole.SAFETY))
     with pytest.raises(PreflightError, match=r"Node 4 is not a motor puck"):
@@ -183,7 +183,7 @@ def test_a_puck_without_its_constants_is_refused(name, value):
 
 
 @pytest.mark.parametrize("mode", [SafetyMode.IDLE, SafetyMode.ACTIVE])
-def test_motors_are_let_go_unless_the_arm_is_active(mode):
+def test_motors_are_idled_unless_the_arm_is_active(mode):
     # As long a heartbeat that start-up is no silence of the host.
     rig = Rig(NetworkOptions(heartbeat_ns=10_000 * MS), HOME_COUNTS)
     if mode is SafetyMode.ACTIVE:
@@ -195,7 +195,7 @@ def test_motors_are_let_go_unless_the_arm_is_active(mode):
     assert told == ([] if mode is SafetyMode.ACTIVE else [b"\x88" + bytes(5)])
 
 
-def test_pucks_that_cannot_be_told_apart_are_warned_of():
+def test_indistinguishable_pucks_give_a_warning():
     rig = Rig(counts=HOME_COUNTS)
     assert not any("same serial" in text for text in start(rig).warnings)
     rig.network.set_property(3, "SN", 1005)
@@ -204,7 +204,7 @@ def test_pucks_that_cannot_be_told_apart_are_warned_of():
 
 
 @pytest.mark.parametrize("hidden", ["safety_serial", "safety_vers", None])
-def test_a_safety_module_is_told_from_another_only_by_all_that_it_tells(hidden):
+def test_safety_modules_are_distinguished_only_by_complete_identities(hidden):
     info = start(Rig(counts=HOME_COUNTS))
     known = (200, info.safety_serial, 2048, 4096, 4731, 5204)
     if hidden:
@@ -212,7 +212,7 @@ def test_a_safety_module_is_told_from_another_only_by_all_that_it_tells(hidden):
     assert info.module_identity() == (() if hidden else known)
 
 
-def test_a_serial_number_that_no_puck_told_is_unknown_in_a_recording():
+def test_an_unread_serial_number_is_recorded_as_unknown():
     info = start(Rig(counts=HOME_COUNTS))
     assert info.metadata()["arm:serials"] == "1001 1002 1003 1004 1005 1006 1007"
     unknown = (replace(info.pucks[0], serial=None), *info.pucks[1:])

@@ -60,12 +60,12 @@ def bench():
 
 
 @pytest.mark.parametrize("is_sending", [True, False])
-def test_a_cycle_has_one_question_at_most(bench, is_sending):
+def test_a_cycle_has_at_most_one_request(bench, is_sending):
     asked = bench.run(1000, is_sending=is_sending)
     assert max(map(len, asked)) == 1
 
 
-def test_mode_and_pendant_alternate_and_pucks_come_every_50_cycles(bench):
+def test_mode_and_pendant_alternate_and_pucks_have_their_own_period(bench):
     asked = [q for cycle in bench.run(1000) for q in cycle]
     safety = [q for q in asked if q[0] == 0x00A]
     assert safety == [GET_MODE, GET_PEN] * 40
@@ -77,14 +77,14 @@ def test_mode_and_pendant_alternate_and_pucks_come_every_50_cycles(bench):
     assert len(held) > 200
 
 
-def test_every_puck_is_asked_for_its_health_in_turn(bench):
+def test_every_puck_is_polled_for_telemetry_in_turn(bench):
     asked = [q for cycle in bench.run(28 * 50) for q in cycle if q[0] != 0x00A]
     asked = [q for q in asked if q[1] in HEALTH]
     expected = {(n, bytes((p,))) for n in range(1, 8) for p in (9, 20, 21, 4)}
     assert Counter(asked) == Counter(expected)
 
 
-def test_the_newest_health_is_kept(bench):
+def test_the_newest_telemetry_is_kept(bench):
     begin = bench.arm.health()
     assert begin == (PuckHealth(35, 33, 48, 0, begin[0].heard_ns),) * 7
     bench.rig.network.set_bus_voltage(41.0)
@@ -94,7 +94,7 @@ def test_the_newest_health_is_kept(bench):
     assert all(p.is_news(bench.rig.clock.t_ns) for p in end)
 
 
-def test_warnings_and_faults_of_the_pendant_are_heard(bench):
+def test_warnings_and_faults_of_the_pendant_are_reported(bench):
     bench.rig.network.pendant("activate")
     bench.run(30)
     assert (bench.arm.safety_warnings(), bench.arm.safety_faults()) == ((), ())
@@ -126,7 +126,7 @@ def test_idle_knows_the_cause_at_once(bench):
     assert bench.arm.safety_faults() == ("other",)
 
 
-def test_a_word_that_makes_no_sense_is_counted_and_ignored(bench, monkeypatch):
+def test_an_invalid_word_is_counted_and_ignored(bench, monkeypatch):
     receive = bench.rig.link.receive
 
     def garble():
@@ -149,7 +149,7 @@ def test_an_arm_that_is_only_read_is_watched_too(bench):
     assert bench.arm.safety_mode() is SafetyMode.ACTIVE
 
 
-def test_an_idle_that_was_not_confirmed_is_told_again_until_it_is(bench):
+def test_an_unconfirmed_idle_is_repeated_until_confirmed(bench):
     bench.rig.network.pendant("activate")
     bench.run(3)
     deaf = bench.rig.network.receive
@@ -179,13 +179,13 @@ def test_an_arm_that_confirms_later_is_known_to_be_idle(bench):
     assert bench.arm.safety_mode() is SafetyMode.IDLE
 
 
-def test_temperatures_are_told_from_the_coldest_to_the_hottest():
+def test_temperatures_are_reported_from_coldest_to_hottest():
     pucks = [PuckHealth(31, 36, heard_ns=0), PuckHealth(33, heard_ns=0), PuckHealth()]
     assert temperature_range(pucks, S) == "31-36 °C"
     assert temperature_range([PuckHealth()], S) == "temperatures unknown"
 
 
-def test_a_puck_that_falls_silent_is_shown_with_the_age_of_what_it_said(bench):
+def test_a_silent_puck_is_shown_with_the_age_of_its_last_reply(bench):
     bench.rig.network.silence(3)
     bench.run(7 * 50 * 5)  # five questions to each puck
     now_ns, pucks = bench.rig.clock.t_ns, bench.arm.health()
@@ -196,14 +196,14 @@ def test_a_puck_that_falls_silent_is_shown_with_the_age_of_what_it_said(bench):
     assert float(fields["pucks:age_s"].split()[2]) > 3.0
 
 
-def test_a_puck_that_is_hot_or_reports_an_error_is_named():
+def test_a_hot_or_faulty_puck_is_named():
     pucks = [PuckHealth(61, 30, 48, 0, 0), PuckHealth(60, 30, 48, 7, 0), PuckHealth()]
     expected = ["puck 1 at 61 °C (limit 60)", "puck 2 reports error 7"]
     assert health_warnings(pucks, S) == expected
     assert health_warnings(pucks, 10 * S) == []
 
 
-def test_health_is_text_in_the_order_of_the_pucks():
+def test_telemetry_is_listed_in_the_order_of_the_pucks():
     pucks = [PuckHealth(31, 29, 48, 0, S), PuckHealth(-5, None, 47, 3, 2 * S)]
     assert health_metadata(pucks, 2 * S) == {
         "pucks:age_s": "1.0 0.0",
@@ -214,7 +214,7 @@ def test_health_is_text_in_the_order_of_the_pucks():
     }
 
 
-def test_it_is_known_when_the_module_was_heard_last(bench):
+def test_the_age_of_the_modules_last_reply_is_known(bench):
     bench.run(30)
     bench.rig.network.silence(10)
     bench.run(1)
@@ -225,7 +225,7 @@ def test_it_is_known_when_the_module_was_heard_last(bench):
     assert 600_000_000 <= bench.rig.clock.t_ns - heard_ns <= 660_000_000
 
 
-def test_a_mode_that_does_not_exist_is_no_answer(bench, monkeypatch):
+def test_an_undefined_mode_is_not_a_reply(bench, monkeypatch):
     receive = bench.rig.link.receive
 
     def garble():
@@ -275,7 +275,7 @@ def poll(poller, cycles, **how):
 PERIOD = ArmSettings().safety_poll_cycles
 
 
-def test_the_mode_is_unknown_with_the_fifth_question_after_four_without_answer():
+def test_the_mode_becomes_unknown_after_unanswered_requests():
     bus = Bus()
     poller = StatusPoller(bus, ArmSettings())
     poll(poller, 1)
@@ -286,7 +286,7 @@ def test_the_mode_is_unknown_with_the_fifth_question_after_four_without_answer()
     assert poller.mode is SafetyMode.UNKNOWN
 
 
-def test_a_burst_of_urgent_questions_is_no_silence():
+def test_a_burst_of_urgent_requests_is_not_silence():
     poller = StatusPoller(Bus(), ArmSettings())
     poll(poller, 1)
     poller.note_mode(SafetyMode.ACTIVE, 1)
@@ -294,7 +294,7 @@ def test_a_burst_of_urgent_questions_is_no_silence():
     assert poller.mode is SafetyMode.ACTIVE
 
 
-def test_a_second_question_in_a_cycle_waits_for_the_next():
+def test_a_second_request_waits_for_the_next_cycle():
     bus = Bus()
     poller = StatusPoller(bus, ArmSettings())
     poller.begin_cycle(0)
@@ -303,7 +303,7 @@ def test_a_second_question_in_a_cycle_waits_for_the_next():
     assert len(bus.sent) == 1
 
 
-def test_the_first_cycle_asks_for_the_mode_and_the_others_are_spread():
+def test_the_first_cycle_requests_the_mode_and_the_others_are_spread():
     bus = Bus()
     poller = StatusPoller(bus, ArmSettings())
     asked = []
@@ -317,7 +317,7 @@ def test_the_first_cycle_asks_for_the_mode_and_the_others_are_spread():
     assert first[:3] == sorted({0, PERIOD // 2 - 1, health})[:3]
 
 
-def test_the_pendant_of_a_start_is_known_before_the_first_question():
+def test_the_pendant_read_at_start_is_known_before_the_first_request():
     bench = Bench()
     bench.rig.network.pendant("activate")
     bench.rig.network.set_bus_voltage(33.0)
@@ -329,7 +329,7 @@ def test_the_pendant_of_a_start_is_known_before_the_first_question():
     assert again.safety_warnings() == ("voltage",)
 
 
-def test_a_start_doubts_nothing_of_before_and_excuses_what_is_unclear_now():
+def test_a_start_clears_earlier_doubts_and_exempts_ambiguous_monitors():
     poller = StatusPoller(Bus(), ArmSettings())
     poller.is_lowering = True
     poller.contradict([2])
@@ -348,7 +348,7 @@ def test_a_start_doubts_nothing_of_before_and_excuses_what_is_unclear_now():
         (9, SafetyMode.ACTIVE, SafetyMode.UNKNOWN, {2}),  # nobody of the arm
     ],
 )
-def test_only_the_puck_that_contradicted_the_module_ends_the_doubt(
+def test_only_the_contradicting_puck_resolves_the_contradiction(
     node, said, mode, contradicted_by
 ):
     poller = StatusPoller(Bus(), ArmSettings())

@@ -35,14 +35,14 @@ def test_each_device_of_a_sound_arm_answers_each_question_once(rig):
     assert asked == {(node, GET_STAT): 3 for node in NODES}
 
 
-def test_a_device_that_is_silent_has_no_answer(rig):
+def test_a_silent_device_has_no_reply(rig):
     rig.network.silence(4)
     assert count(rig).counts == [1, 1, 1, 0, 1, 1, 1, 1]
 
 
 @pytest.mark.parametrize("node", [1, 7, 10])
 @pytest.mark.parametrize(("after_ms", "found"), [(0, 2), (4, 2), (6, 1)])
-def test_two_devices_of_one_number_are_counted(rig, node, after_ms, found):
+def test_two_devices_with_one_node_number_are_counted(rig, node, after_ms, found):
     faults = rig.network.faults
     faults.answer_twice(property_reply_id(node), lambda data: data, after_ms * MS)
     answers = count(rig)
@@ -51,13 +51,13 @@ def test_two_devices_of_one_number_are_counted(rig, node, after_ms, found):
     assert answers.differing == []
 
 
-def test_devices_of_one_number_that_disagree_are_named(rig):
+def test_devices_with_one_node_number_that_disagree_are_named(rig):
     other = encode_reply(STAT, 0, is_wide=False)
     rig.network.faults.answer_twice(property_reply_id(5), lambda _: other, MS)
     assert count(rig, 2).differing == [5]
 
 
-def test_a_question_that_was_answered_twice_once_counts(rig):
+def test_a_request_answered_twice_once_is_counted(rig):
     rig.network.faults.duplicate(property_reply_id(2), 1)
     assert count(rig, 3).counts == [1, 2, *ONCE[2:]]
 
@@ -65,27 +65,27 @@ def test_a_question_that_was_answered_twice_once_counts(rig):
 @pytest.mark.parametrize(
     "other", [encode_reply(STAT + 1, 2, is_wide=False), b"\x05", b"", bytes(8)]
 )
-def test_what_answers_another_question_or_none_is_no_answer(rig, other):
+def test_a_reply_to_another_request_or_none_is_ignored(rig, other):
     rig.network.faults.answer_twice(property_reply_id(5), lambda _: other, MS)
     answers = count(rig)
     assert (answers.counts, answers.differing) == (ONCE, [])
 
 
-def test_an_answer_from_before_the_question_is_none(rig):
+def test_a_reply_from_before_the_request_is_ignored(rig):
     rig.link.send(3, GET_STAT)
     rig.link.send(1, GET_STAT)
     rig.rest(2 * MS)
     assert count(rig).counts == ONCE
 
 
-def test_a_quiet_bus_is_listened_to_for_as_long_as_wanted_and_asked_nothing(rig):
+def test_listening_to_a_quiet_bus_lasts_as_requested_and_sends_nothing(rig):
     before_ns = rig.clock.t_ns
     assert listen(rig, 50) == RestTraffic(frames=0, master=None, error_frames=0)
     assert rig.clock.t_ns - before_ns == 50 * MS
     assert rig.sent == []
 
 
-def test_what_devices_say_before_and_meanwhile_is_counted_and_nothing_later(rig):
+def test_frames_up_to_the_end_of_listening_are_counted(rig):
     rig.link.send(3, GET_STAT)
     rig.rest(2 * MS)
     for node, late_ms in ((4, 20), (5, 40), (6, 60)):
@@ -94,7 +94,7 @@ def test_what_devices_say_before_and_meanwhile_is_counted_and_nothing_later(rig)
     assert listen(rig, 50).frames == 3
 
 
-def test_another_master_and_errors_on_the_bus_are_heard(rig):
+def test_another_master_and_bus_errors_are_reported(rig):
     rig.network.faults.report_error(0x004)
     rig.network.other_master.join(3)
     heard = listen(rig, 20)

@@ -30,7 +30,7 @@ def close(found, expected, atol=EXACT):
     return np.allclose(found, np.array(expected, float), rtol=0.0, atol=atol)
 
 
-def test_the_plate_is_where_two_other_programs_put_it(bare, q, vector):
+def test_the_plate_pose_agrees_with_two_independent_programs(bare, q, vector):
     position, rotation = bare.plate_pose(q)
     assert close(position, vector["tool_position"])
     assert close(rotation, vector["tool_rotation"])
@@ -75,7 +75,7 @@ def test_the_torque_of_a_weight_at_the_foot_agrees(foot_model, q, vector):
     assert close(foot_model.weight_torque(q, 0.3), vector["virtual_weight_torque"])
 
 
-def test_the_motion_of_the_sole_is_pose_and_jacobian_at_once(foot_model, q, vector):
+def test_the_motion_of_the_sole_agrees_with_pose_and_jacobian(foot_model, q, vector):
     qd = np.array(vector["qd"])
     pose, rotation, twist = foot_model.sole_motion(q, qd)
     assert close(pose[:3], vector["sole_position"])
@@ -93,7 +93,7 @@ def test_the_jacobian_of_the_sole_is_the_slope_of_its_position(foot_model, q):
     assert close(foot_model.sole_jacobian(q)[:3], np.transpose(slope), atol=1e-8)
 
 
-def test_a_path_is_every_pose_of_it(foot_model, arm_vectors):
+def test_a_path_is_evaluated_at_every_pose(foot_model, arm_vectors):
     q = np.array([vector["q"] for vector in arm_vectors["vectors"]])
     path = foot_model.sole_path(q)
     expected = [vector["sole_position"] for vector in arm_vectors["vectors"]]
@@ -167,7 +167,7 @@ def test_a_box_has_the_inertia_of_a_box():
     )
 
 
-def test_a_heavier_foot_is_held_with_more(bare, foot_model):
+def test_a_heavier_foot_needs_more_holding_torque(bare, foot_model):
     q = np.array([0, 0.9, 0, 1.6, 0, np.pi - 2.5, 0])
     tool = foot_model.tool
     lifted = bare.gravity(q) - foot_model.gravity(q)
@@ -184,7 +184,7 @@ def test_the_shipped_sensor_is_light_and_flat():
 
 @pytest.mark.shared_data
 @pytest.mark.parametrize("name", STROKES)
-def test_a_real_arm_was_where_the_model_says(shared_data, name):
+def test_a_recorded_arm_agrees_with_the_model(shared_data, name):
     path = shared_data / "real" / "wam_surface_fk" / f"{name}.csv"
     table = np.loadtxt(path, delimiter=",", skiprows=1)
     q = np.zeros((len(table), 7))

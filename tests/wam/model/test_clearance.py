@@ -33,7 +33,7 @@ def sphere_at(point, side):
 
 
 @pytest.mark.parametrize("name", COLLIDING)
-def test_a_pose_that_collides_is_known_with_its_pair(clearance, name):
+def test_a_colliding_pose_is_reported_with_its_pair_of_bodies(clearance, name):
     q, *_ = COLLIDING[name]
     assert clearance.nearest(np.array(q, dtype=float)).distance < CLEARANCE_MARGIN
 
@@ -42,7 +42,7 @@ def test_an_upright_arm_is_far_from_everything(clearance):
     assert clearance.nearest(UPRIGHT).distance > 0.1
 
 
-def test_the_floor_is_as_far_below_the_foot_as_the_kinematics_say(example_tool):
+def test_floor_clearance_of_the_foot_agrees_with_the_kinematics(example_tool):
     model = ArmModel(CONSTANTS, example_tool)
     down = np.array([0.0, 1.2, 0.0, 1.2, 0.0, 0.75, 0.0])  # joints add up to pi
     sole = model.sole_pose(down)[0][2]
@@ -51,11 +51,11 @@ def test_the_floor_is_as_far_below_the_foot_as_the_kinematics_say(example_tool):
     assert height.distance == pytest.approx(0.2, abs=0.01)
 
 
-def test_the_floor_is_what_the_arm_stands_on():
+def test_the_floor_is_the_surface_the_arm_stands_on():
     assert pytest.approx(0.346) == BASE_HEIGHT
 
 
-def test_an_obstacle_is_where_it_was_put(example_tool):
+def test_an_obstacle_is_at_its_stated_location(example_tool):
     model = ArmModel(CONSTANTS, example_tool)
     sole, rotation = model.sole_pose(UPRIGHT)
     beside = sole + 0.2 * rotation[:, 2]  # 200 mm on, half a side nearer
@@ -65,7 +65,7 @@ def test_an_obstacle_is_where_it_was_put(example_tool):
     assert gap.distance == pytest.approx(0.15, abs=0.01)
 
 
-def test_a_way_through_an_obstacle_is_hit_though_both_ends_are_free(example_tool):
+def test_a_path_through_an_obstacle_collides_though_both_ends_are_free(example_tool):
     start, goal = UPRIGHT.copy(), UPRIGHT.copy()
     start[0], goal[0] = -0.8, 0.8
     middle = ArmModel(CONSTANTS, example_tool).sole_pose(UPRIGHT)[0]
@@ -110,7 +110,7 @@ def test_a_foot_in_its_container_may_leave_it_and_go_no_deeper(example_tool):
     assert clearance.first_collision(through, around) is not None
 
 
-def test_a_gap_is_told_in_words_and_millimetres(clearance):
+def test_a_clearance_is_described_in_millimetres(clearance):
     text = clearance.nearest(CONSTANTS.home).text()
     assert "mm from" in text
     assert "the wrist" in text
@@ -168,7 +168,7 @@ PAIRS = [
 ON_FLOOR = ("the upper arm", "the elbow", "the forearm", "the wrist", "the foot")
 
 
-def test_every_body_encloses_what_was_measured_of_the_arm(example_tool, clearance):
+def test_every_body_encloses_the_measured_arm(example_tool, clearance):
     """Distances of all pairs against ones made here from the table of the joints."""
     rng = np.random.default_rng(3)
     bodies = enclosing(example_tool)
@@ -188,7 +188,7 @@ def test_every_body_encloses_what_was_measured_of_the_arm(example_tool, clearanc
         assert (found[~apart] < 1e-3).all()
 
 
-def test_a_way_is_looked_at_from_end_to_end_in_equal_steps():
+def test_a_path_is_checked_end_to_end_in_equal_steps():
     start, goal = UPRIGHT, UPRIGHT + np.array([0.05, -0.1, 0, 0, 0, 0, 0])
     path = straight_path(start, goal)
     assert path[0] == pytest.approx(start)
@@ -233,7 +233,7 @@ LAST = len(straight_path(np.zeros(7), np.eye(7)[0])) - 1
         ({LAST: 0.01, 7: 0.0079}, True),
     ],
 )
-def test_on_a_way_nothing_is_closer_than_the_margin_or_its_ends(
+def test_a_clear_path_comes_no_closer_than_the_margin_or_its_ends(
     example_tool, gaps, is_hit
 ):
     hit = Staged(example_tool, gaps).first_collision(np.zeros(7), np.eye(7)[0])

@@ -21,7 +21,7 @@ def test_home_stands_on_two_stops():
     assert np.flatnonzero(outside).tolist() == [1, 3]
 
 
-def test_the_text_is_kept_and_gives_the_same_arm():
+def test_the_source_text_is_kept_and_gives_the_same_arm():
     again = load_constants(SHIPPED.text)
     assert again.text == SHIPPED.text
     assert np.array_equal(again.j2mp, SHIPPED.j2mp)
@@ -30,7 +30,7 @@ def test_the_text_is_kept_and_gives_the_same_arm():
         assert np.array_equal(ours.inertia, theirs.inertia)
 
 
-def test_inertias_could_belong_to_bodies():
+def test_inertias_are_physically_consistent():
     for link in SHIPPED.links:
         assert np.array_equal(link.inertia, link.inertia.T)
         moments = np.linalg.eigvalsh(link.inertia)
@@ -74,7 +74,7 @@ def test_a_malformed_model_is_a_settings_error(name):
     assert caught.value.hint
 
 
-def test_what_is_missing_in_an_arm_model_is_named_in_a_line():
+def test_a_missing_part_of_an_arm_model_is_named_in_one_line():
     text = load_constants().text.replace("[gravity]", "[weight]")
     with pytest.raises(SettingsError) as caught:
         load_constants(text)
@@ -84,7 +84,7 @@ def test_what_is_missing_in_an_arm_model_is_named_in_a_line():
     assert "http" not in message
 
 
-def test_what_is_wrong_between_two_parts_of_an_arm_model_is_said_in_a_line():
+def test_contradicting_parts_of_an_arm_model_are_named_in_one_line():
     with pytest.raises(SettingsError) as caught:
         load_constants(MALFORMED["stops crossed"])
     message = str(caught.value)

@@ -29,7 +29,7 @@ def example(**changed):
     return MotorFriction(**{**values, **changed})
 
 
-def test_figures_of_joints_come_back_from_the_motors_that_share_them():
+def test_joint_friction_is_recovered_from_the_motors_that_share_it():
     motors = motor_shares(CONSTANTS, CONSTANTS.coulomb, 1)
     assert (motors > 0.0).all()
     # joints 2 and 3 were identified with one figure for both of their motors
@@ -53,7 +53,7 @@ def test_steady_friction_is_against_the_motion_and_falls_from_breakaway():
     assert back == pytest.approx(-1.3 * other)
 
 
-def test_a_motor_that_bears_more_rubs_more():
+def test_a_loaded_motor_has_more_friction():
     friction, still = example(), np.zeros(7)
     speed = np.full(7, 50.0)
     more = friction.steady(still, np.full(7, -1.1), speed)
@@ -62,7 +62,7 @@ def test_a_motor_that_bears_more_rubs_more():
     assert more - less == pytest.approx(growth, rel=1e-3)
 
 
-def test_half_of_the_excess_is_gone_at_the_stribeck_speed():
+def test_breakaway_excess_falls_to_half_at_the_stribeck_speed():
     friction, still = example(), np.zeros(7)
     load_torque = np.full(7, 0.1)
     slow, half, fast = (
@@ -76,13 +76,13 @@ def test_half_of_the_excess_is_gone_at_the_stribeck_speed():
     ("deflection", "share"),
     [(0.0, 0.0), (0.7, 0.0), (0.85, 0.5), (1.0, 1.0), (1.4, 1.0)],
 )
-def test_a_bristle_bends_up_to_seven_tenths_and_slides_from_all_of_it(
+def test_a_bristle_bends_elastically_and_slides_at_its_full_deflection(
     deflection, share
 ):
     assert plastic_share(deflection) == pytest.approx(share)
 
 
-def test_friction_survives_plain_values():
+def test_friction_round_trips_through_plain_values():
     before = example()
     after = friction_of(before.metadata())
     for name in MotorFriction.__slots__:
@@ -99,6 +99,6 @@ def test_friction_survives_plain_values():
         ("stribeck", [-1.0] * 7),
     ],
 )
-def test_friction_that_cannot_be_true_is_refused(name, value):
+def test_implausible_friction_is_refused(name, value):
     with pytest.raises(ValueError, match=r"expected|above 0|or more"):
         friction_of({**example().metadata(), name: value})

@@ -9,13 +9,13 @@ DOWN = np.array([0, 0.9, 0, 1.6, 0, np.pi - 2.5, 0])
 J2, J4, J6 = 1, 3, 5
 
 
-def test_without_a_virtual_mass_everything_floats(foot_model):
+def test_without_a_virtual_mass_the_whole_arm_floats(foot_model):
     tau = compensation(foot_model, DOWN, 0.0)
     expected = [-26.532280181, -5.109250202, 0.044017118]
     assert tau[[J2, J4, J6]] == pytest.approx(expected, abs=1e-9)
 
 
-def test_a_virtual_mass_takes_from_the_holding_torque(foot_model):
+def test_a_virtual_mass_reduces_the_holding_torque(foot_model):
     added = compensation(foot_model, DOWN, 0.3) - compensation(foot_model, DOWN, 0.0)
     expected = [1.955315529, 0.605060511, -0.029430000]
     assert added[[J2, J4, J6]] == pytest.approx(expected, abs=1e-9)
@@ -27,13 +27,13 @@ def test_the_sum_is_what_is_commanded(foot_model):
     assert tau[[J2, J4, J6]] == pytest.approx(expected, abs=1e-9)
 
 
-def test_every_pose_agrees_with_the_vectors(foot_model, arm_vectors):
+def test_every_pose_agrees_with_the_reference_vectors(foot_model, arm_vectors):
     for vector in arm_vectors["vectors"]:
         tau = compensation(foot_model, np.array(vector["q"]), 0.3)
         assert np.allclose(tau, vector["augmented_gravity"], rtol=0.0, atol=1e-9)
 
 
-def test_the_ground_carries_the_virtual_weight(foot_model):
+def test_the_ground_bears_the_virtual_weight(foot_model):
     """Below the centre of mass, the ground's force balances the added torque."""
     ground = np.array([0.0, 0.0, 0.3 * GRAVITY])
     from_ground = foot_model.sole_jacobian(DOWN)[:3].T @ ground
@@ -55,14 +55,14 @@ def test_the_foot_sinks_without_a_ground(foot_model):
     assert acceleration == pytest.approx(-1.005, abs=0.001)  # weight without inertia
 
 
-def test_the_virtual_mass_grows_over_two_seconds():
+def test_the_virtual_mass_is_ramped():
     mass = VirtualMass()
     mass.aim(0.4, 10 * S)
     found = [mass.at(10 * S + int(t * S)) for t in (-1.0, 0.0, 0.5, 1.0, 2.0, 9.0)]
     assert found == pytest.approx([0.0, 0.0, 0.1, 0.2, 0.4, 0.4], abs=1e-12)
 
 
-def test_a_new_aim_begins_where_the_mass_is():
+def test_a_new_target_mass_ramps_from_the_present_mass():
     mass = VirtualMass()
     mass.aim(0.4, 0)
     mass.aim(0.0, 1 * S)
@@ -70,7 +70,7 @@ def test_a_new_aim_begins_where_the_mass_is():
     assert found == pytest.approx([0.2, 0.1, 0.0, 0.0], abs=1e-12)
 
 
-def test_there_is_no_virtual_mass_before_it_is_asked_for():
+def test_there_is_no_virtual_mass_until_requested():
     assert VirtualMass().at(5 * S) == 0.0
 
 

@@ -35,7 +35,7 @@ def test_shipped_moments_give_the_reference_torques(arm_vectors):
         assert tau == pytest.approx(vector["gravity_mus_g9805"], abs=1e-9)
 
 
-def test_masses_and_moments_agree_exactly():
+def test_masses_and_moments_give_equal_torques():
     mus = moments_of_links(CONSTANTS)
     model = ArmModel(CONSTANTS)
     for q in random_poses(20, seed=1):
@@ -102,7 +102,7 @@ def test_too_few_poses_are_refused():
         check_fit(fit)
 
 
-def test_poses_that_show_a_direction_poorly_are_refused():
+def test_poorly_conditioned_poses_are_refused():
     fit = MomentFit(CONSTANTS.mus, 12, 30.1, np.zeros((4, 7)))
     with pytest.raises(SettingsError, match=r"condition 30 \(limit 30\)"):
         check_fit(fit)
@@ -125,7 +125,7 @@ def test_the_worst_joint_and_pose_are_named():
         check_fit(fit)
 
 
-def test_a_residual_that_is_no_number_is_refused():
+def test_a_residual_that_is_not_a_number_is_refused():
     fit = MomentFit(CONSTANTS.mus, 12, 6.0, np.full((3, 7), np.nan))
     with pytest.raises(SettingsError, match="unexplained"):
         check_fit(fit)
@@ -136,7 +136,7 @@ def test_shapes_must_agree():
         fit_moments(CONSTANTS, np.zeros((3, 7)), np.zeros((2, 7)))
 
 
-def test_a_model_of_shipped_moments_weighs_what_they_say(example_tool):
+def test_a_model_with_the_shipped_moments_has_their_mass(example_tool):
     model = gravity_model(CONSTANTS, example_tool, CONSTANTS.mus)
     bare = ArmModel(CONSTANTS)
     loaded = ArmModel(CONSTANTS, example_tool)
@@ -147,7 +147,7 @@ def test_a_model_of_shipped_moments_weighs_what_they_say(example_tool):
 
 
 @pytest.mark.parametrize("mass", [0.45, 0.70])
-def test_moments_fitted_with_one_foot_serve_another(example_tool, mass):
+def test_moments_fitted_with_one_foot_apply_to_another(example_tool, mass):
     foot = example_tool.foot
     other = dataclasses.replace(foot, mass=mass, com=foot.com + 0.02)
     session = dataclasses.replace(example_tool, foot=other)

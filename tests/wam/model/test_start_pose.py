@@ -19,7 +19,7 @@ def row(name="S10", **changes):
 
 
 @pytest.mark.parametrize("name", ["S0", "S10", "S15"])
-def test_it_is_the_pose_that_a_person_chose(name):
+def test_the_start_pose_is_the_manually_chosen_one(name):
     computed = start_of(row(name, start_q=None), MODEL)
     assert computed == pytest.approx(row(name).start_q, abs=2e-4)
 
@@ -48,13 +48,13 @@ def test_the_sole_is_flat_on_the_far_end(changes):
     assert q[3] > 0.0
 
 
-def test_a_stated_pose_serves_a_push_the_other_way():
+def test_a_stated_pose_serves_a_push_in_the_other_direction():
     q = start_of(row(push_deg=180), MODEL)
     near = terrain_frame(row(push_deg=180)).far_end
     assert MODEL.sole_pose(q)[0] == pytest.approx(near, abs=1e-6)
 
 
-def test_a_push_the_other_way_crosses_the_same_plane():
+def test_a_push_in_the_other_direction_crosses_the_same_plane():
     down, up = terrain_frame(row()), terrain_frame(row(push_deg=180))
     assert up.axes()[0] == pytest.approx(-down.axes()[0])
     assert up.axes()[2] == pytest.approx(down.axes()[2])
@@ -64,7 +64,7 @@ def test_a_push_the_other_way_crosses_the_same_plane():
     assert back.axes() == pytest.approx(down.axes())
 
 
-def test_what_the_arm_does_not_reach_is_refused():
+def test_an_unreachable_start_pose_is_refused():
     with pytest.raises(SettingsError, match="out of reach"):
         elbow_up(MODEL, terrain_frame(row()).axes(), np.array([1.2, 0.0, 0.1]))
     with pytest.raises(SettingsError, match="S10: The arm cannot"):

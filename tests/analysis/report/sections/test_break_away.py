@@ -37,7 +37,7 @@ def test_every_terrain_has_its_force_from_rest_and_in_motion(results):
     assert "0.06 m/s" in table.note
 
 
-def test_the_table_says_what_kind_of_answer_it_is(results):
+def test_the_table_states_the_kind_of_answer(results):
     table = break_away_table(results)
     assert cell(table, "S0", "from rest") == "break-away"
     assert cell(table, "TF", "from rest") == "sliding"
@@ -51,7 +51,7 @@ def test_counts_are_those_of_the_pushes(results):
         assert int(found.is_held.sum()) == found.model.held
 
 
-def test_the_step_curve_and_the_model_agree_on_stones(results):
+def test_survival_curve_and_model_agree_on_stones(results):
     for name in ("S0", "B0"):
         found = results.of(break_away_findings)[name]
         seen = found.survival.share_below(found.forces)
@@ -60,7 +60,7 @@ def test_the_step_curve_and_the_model_agree_on_stones(results):
         assert found.model.distance < found.limit
 
 
-def test_numbers_of_the_report_stand_in_its_file(results):
+def test_numbers_of_the_report_are_in_its_data_file(results):
     numbers = json.loads(json.dumps(plain_findings(results)["break_away"]))
     known = results.of(break_away_findings)["S0"]
     answer = known.model.available(known.load, 0.1)
@@ -70,7 +70,7 @@ def test_numbers_of_the_report_stand_in_its_file(results):
     assert len(numbers["S0"]["pushes"]) == known.model.slips + known.model.held
 
 
-def test_peaks_that_held_are_marked_apart(results):
+def test_censored_peaks_are_marked_separately(results):
     with styled():
         figure = draw_available(results)
         _, labels = figure.axes[0].get_legend_handles_labels()
@@ -80,7 +80,7 @@ def test_peaks_that_held_are_marked_apart(results):
     assert "0.06 m/s" in caption_available(results)
 
 
-def test_the_risk_has_its_steps_beside_it(results):
+def test_the_risk_is_shown_with_its_step_curve(results):
     with styled():
         figure = draw_risk(results)
     first = figure.axes[0]

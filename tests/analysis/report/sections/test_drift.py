@@ -26,7 +26,7 @@ RIG = [
 ]
 
 
-def test_trials_stand_in_the_order_of_their_beginning():
+def test_trials_are_ordered_by_start():
     above, below = draw_drift(SimpleNamespace(rig=RIG)).axes
     x, y = above.lines[0].get_data()
     assert list(y) == [0.1, 0.0, 0.2, 0.5]
@@ -36,7 +36,7 @@ def test_trials_stand_in_the_order_of_their_beginning():
     assert names == ["S001", "S002", "S003"]
 
 
-def test_the_way_from_the_first_to_the_last_session_is_told():
+def test_the_change_from_first_to_last_session_is_reported():
     assert "+0.45, -0.20, +1.00 N" in caption_drift(SimpleNamespace(rig=RIG))
     loads = caption_drift(SimpleNamespace(rig=RIG[1:]))
     assert "the load by +0.40 N" in loads

@@ -34,7 +34,7 @@ def results_of(**terrains):
     return SimpleNamespace(study=SimpleNamespace(terrains=made))
 
 
-def test_the_papers_experiment_has_none():
+def test_the_papers_experiment_has_no_factor():
     results = results_of(
         S0=(0.0, {"foot": "tread"}, [1.0]), Tf=(0.0, {"foot": "bare"}, [0.5])
     )
@@ -62,7 +62,7 @@ def test_the_first_two_factors_that_vary_are_shown(second, names):
     assert ax.get_xlabel() == f"{names[0]}{unit}"
 
 
-def test_a_number_stands_at_itself_and_what_does_not_apply_last():
+def test_numeric_levels_are_ordered_by_value_and_missing_ones_last():
     results = results_of(
         A=(0.0, {"d50": 37.0}, [1.0]),
         B=(0.0, {"d50": 12.0}, [0.5]),

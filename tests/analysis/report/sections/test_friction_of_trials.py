@@ -46,13 +46,13 @@ def test_a_trial_carries_the_calibration_that_was_recorded_with_it(trial):
     assert trial.friction_text == text()
 
 
-def test_drag_is_that_of_the_calibration(trial):
+def test_drag_follows_the_calibration(trial):
     power = 0.1 * np.abs(CONSTANTS.j2mp[:, 1]) @ example().coulomb
     expected = np.median(power / np.abs(trial.traction[:, 0]))
     assert health(trial).drag == pytest.approx(expected)
 
 
-def test_what_was_compensated_is_no_drag(trial):
+def test_compensated_friction_is_not_drag(trial):
     none, most = health(trial), health(trial, share="0.8")
     assert most.drag == pytest.approx(0.2 * none.drag)
 

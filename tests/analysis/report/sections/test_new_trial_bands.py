@@ -30,7 +30,7 @@ def reach_of(others, nominal):
     return conformal_reaches([np.full(3, 1e6), *others], nominal)[0]
 
 
-def test_a_reach_is_the_quantile_with_one_part_at_infinity():
+def test_a_conformal_radius_has_one_weight_at_infinity():
     scores = [np.array([float(k)]) for k in range(1, 10)]  # nine trials
     # the k-th smallest of nine is reached with a share of k/10
     assert reach_of(scores, 0.5) == 5.0
@@ -38,12 +38,12 @@ def test_a_reach_is_the_quantile_with_one_part_at_infinity():
     assert reach_of(scores, 0.9) == 9.0
 
 
-def test_nine_trials_cannot_show_95_percent():
+def test_too_few_trials_cannot_give_the_nominal_coverage():
     scores = [np.array([float(k)]) for k in range(9)]
     assert reach_of(scores, 0.95) == np.inf
 
 
-def test_a_long_trial_weighs_no_more_than_a_short_one():
+def test_long_and_short_trials_have_equal_weight():
     short, long = np.full(1, 5.0), np.full(1000, 1.0)
     assert reach_of([short, long, long], 0.5) == 1.0
     assert reach_of([short, long, long], 0.7) == 5.0
@@ -51,7 +51,7 @@ def test_a_long_trial_weighs_no_more_than_a_short_one():
 
 @pytest.mark.parametrize("nominal", [0.5, 0.8, 0.9])
 @pytest.mark.parametrize("trials", [2, 7, 40])
-def test_a_reach_is_that_of_all_other_samples_weighed_by_trials(trials, nominal):
+def test_a_conformal_radius_uses_other_samples_weighted_by_trial(trials, nominal):
     rng = np.random.default_rng(trials)
     scores = [np.abs(rng.normal(size=rng.integers(1, 30))) for _ in range(trials)]
     for k, reach in enumerate(conformal_reaches(scores, nominal)):
@@ -63,7 +63,7 @@ def test_a_reach_is_that_of_all_other_samples_weighed_by_trials(trials, nominal)
 
 
 @pytest.mark.parametrize(("spread", "low", "high"), [(1.0, 0.9, 1.2), (2.0, 1.7, 2.6)])
-def test_an_oracle_is_as_wide_as_the_trials_need_it(spread, low, high):
+def test_an_oracle_band_is_as_wide_as_needed(spread, low, high):
     from scipy.special import ndtr
 
     rng = np.random.default_rng(0)
@@ -84,7 +84,7 @@ def results(make_series, moving):
     return compute_results(study)
 
 
-def test_shares_of_a_terrain_add_up(results):
+def test_variance_shares_of_a_terrain_add_up(results):
     assert [share.terrain for share in results.of(held_out_shares)] == ["S0", "TF"]
     for share in results.of(held_out_shares):
         assert share.trials == 4
@@ -97,7 +97,7 @@ def test_components_of_every_terrain_are_in_the_study(results):
         assert result.components.trials == 4
 
 
-def test_the_report_states_family_worth_and_oracle(results):
+def test_the_report_states_family_value_and_oracle(results):
     families, worth, oracle = new_trial_tables(results)
     assert [row[0] for row in families.rows] == ["S0", "TF"]
     assert [row[0] for row in oracle.rows] == ["S0", "S0", "TF", "TF"]
@@ -124,7 +124,7 @@ def test_shares_are_valid_json(results):
     assert len(plain["new_trial"]["S0"]["density"]) == 10
 
 
-def test_without_the_model_of_a_new_trial_there_is_nothing_of_it(small_study):
+def test_without_a_new_trial_model_the_report_omits_it(small_study):
     results = compute_results(small_study)
     assert results.of(held_out_shares) == []
     assert new_trial_tables(results) == []

@@ -34,7 +34,7 @@ def studied(trials):
     return run_study({"X": trials}, OPTIONS, simulated=True)
 
 
-def test_nothing_stands_out_among_trials_that_are_alike():
+def test_similar_trials_have_no_outlier():
     trials = [push(k) for k in range(10)]
     study = studied(trials)
     assert outlier_trials(study) == []
@@ -56,7 +56,7 @@ def test_nothing_stands_out_among_trials_that_are_alike():
         (lambda s: replace(s, F_t=-s.F_t), "the ground drives the foot"),
     ],
 )
-def test_a_trial_with_something_wrong_is_the_first_and_says_what(change, words):
+def test_a_faulty_trial_ranks_first_with_its_cause(change, words):
     trials = [push(k) for k in range(10)]
     trials[3] = change(trials[3])
     study = studied(trials)
@@ -68,7 +68,7 @@ def test_a_trial_with_something_wrong_is_the_first_and_says_what(change, words):
     assert table.rows[0][1] == "4"
 
 
-def test_three_of_ten_trials_with_the_same_fault_do_not_hide_each_other():
+def test_several_trials_with_one_fault_do_not_mask_each_other():
     trials = [push(k) for k in range(10)]
     for k in (2, 5, 8):
         trials[k] = replace(trials[k], F_t=trials[k].F_t + 3.0)
@@ -82,7 +82,7 @@ def test_the_scale_is_the_standard_deviation_of_normal_values():
         assert np.mean(found) == pytest.approx(2.0, rel=0.04), count
 
 
-def test_half_of_the_values_spoil_no_scale():
+def test_the_scale_is_robust_to_half_of_the_values():
     x = np.random.default_rng(1).normal(size=20)
     x[:9] = 1e6
     assert qn_scale(x) < 5.0
@@ -121,7 +121,7 @@ def stood(series):
         ),
     ],
 )
-def test_a_wrong_sensor_is_seen_at_a_foot_that_stands_on_any_ground(change, words):
+def test_a_wrong_sensor_is_detected_at_rest_on_any_ground(change, words):
     trials = [stood(push(k, mu=0.4 + 0.1 * k)) for k in range(10)]
     assert outlier_trials(studied(trials)) == []
     trials[3] = change(trials[3])

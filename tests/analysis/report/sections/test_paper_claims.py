@@ -45,14 +45,14 @@ def claim_at(evidence: PaperEvidence, reference: str):
     )
 
 
-def test_holms_p_values_are_those_of_the_step_down():
+def test_holm_p_values_follow_the_step_down_procedure():
     adjusted = adjusted_by_holm([0.01, 0.04, 0.03, 0.005])
     assert adjusted == pytest.approx([0.03, 0.06, 0.06, 0.02])
     assert adjusted_by_holm([0.4, 0.9]) == pytest.approx([0.8, 0.9])
     assert adjusted_by_holm([0.7, 0.6]) == pytest.approx([1.0, 1.0])
 
 
-def test_ten_trials_cannot_tell_more_than_25_comparisons_apart():
+def test_few_trials_limit_the_number_of_comparisons():
     pairs = [PairedComparison(-0.1, 0.01, 2 / 1024, 10)] * 26
     assert smallest_adjusted(pairs[:25]) < 0.05 < smallest_adjusted(pairs)
     assert smallest_adjusted(pairs) == pytest.approx(
@@ -63,7 +63,7 @@ def test_ten_trials_cannot_tell_more_than_25_comparisons_apart():
     assert "10 trials are too few" in beyond_chance(pairs, -1, "terrains")
 
 
-def test_the_bound_is_counted_over_the_samples_that_stick(evidence, small_study):
+def test_the_bound_is_evaluated_on_sticking_samples(evidence, small_study):
     entry = next(e for e in evidence.sticking if e.terrain == "S0")
     result = small_study.terrains["S0"]
     mu, F_s = (getattr(result.whole.fit.parameters, key) for key in ("mu", "F_s"))
@@ -108,7 +108,7 @@ def test_more_rows_help_where_the_error_falls(evidence, change, agreement):
     assert "1200" in claim.shown
 
 
-def test_errors_come_with_few_rows_first():
+def test_learning_curves_are_ordered_by_training_rows():
     rng = np.random.default_rng(0)
     x = rng.uniform(-3.0, 3.0, (300, 2))
     y = np.sin(x[:, 0]) + 0.5 * x[:, 1] + rng.normal(0.0, 0.02, 300)
@@ -119,12 +119,12 @@ def test_errors_come_with_few_rows_first():
     assert many < few
 
 
-def test_more_rows_are_four_times_as_many(evidence):
+def test_learning_curves_grow_by_a_constant_factor(evidence):
     assert {entry.rows for entry in evidence.more_rows} == {240}
     assert len(evidence.more_rows) == 3
 
 
-def test_every_statement_stands_in_the_report_and_beside_it(small_study):
+def test_every_statement_is_in_the_report_and_its_data_file(small_study):
     results = compute_results(small_study)
     (table,) = statements(results)
     assert len(table.rows) > 20
@@ -135,7 +135,7 @@ def test_every_statement_stands_in_the_report_and_beside_it(small_study):
     assert all(entry["numbers"] for entry in shown)
 
 
-def test_terrains_that_are_not_the_papers_are_not_compared(small_study):
+def test_terrains_outside_the_paper_are_not_compared(small_study):
     steeper = replace(small_study.terrains["S0"], incline_deg=8.0)
     other = {**small_study.terrains, "S0": steeper}
     results = compute_results(replace(small_study, terrains=other))
@@ -174,12 +174,12 @@ def test_statements_about_missing_terrains_are_not_shown(slice_trials):
     )
 
 
-def test_one_terrain_is_held_against_nothing(small_study):
+def test_a_single_terrain_has_no_comparison(small_study):
     alone = replace(small_study, terrains={"S0": small_study.terrains["S0"]})
     assert paper_claims(gather_evidence(alone, None, [])) == []
 
 
-def test_bounds_are_on_quantities_that_are_measured(evidence):
+def test_bounds_refer_to_measured_quantities(evidence):
     for claim in CLAIMS:
         if (measured := claim.measure(evidence)) is not None:
             known = {**measured.numbers, **measured.further}
@@ -194,7 +194,7 @@ def test_bounds_are_on_quantities_that_are_measured(evidence):
         (0.8, 2.1, Agreement.NO),
     ],
 )
-def test_a_study_agrees_where_every_bound_holds(explained, ratio, agreement):
+def test_a_study_agrees_if_every_bound_holds(explained, ratio, agreement):
     claim = next(claim for claim in CLAIMS if claim.statement.startswith("v_t and F_n"))
     quantities = {"R²": explained, "stones over plates": ratio}
     assert claim.verdict(quantities) is agreement

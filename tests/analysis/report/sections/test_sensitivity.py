@@ -40,7 +40,7 @@ from analysis.study.study import StudyOptions, run_study
         "lag=51",
     ],
 )
-def test_choices_that_there_are_not_are_refused_with_a_list(text):
+def test_unknown_choices_are_refused_with_a_list(text):
     with pytest.raises(SettingsError) as refused:
         parse_choice(text)
     key = text.partition("=")[0]
@@ -67,7 +67,9 @@ def test_choices_change_what_they_name_and_nothing_else():
 
 
 @pytest.mark.parametrize("text", ["smoothing=41", "window=0.02:0.12"])
-def test_other_training_samples_are_tested_on_the_same_ones(make_series, moving, text):
+def test_other_training_samples_are_scored_on_the_same_test_samples(
+    make_series, moving, text
+):
     trials = [make_series(moving, seed=k) for k in range(3)]
     before = StudyOptions()
     after = parse_choice(text).options(before)
@@ -87,9 +89,7 @@ def test_other_training_samples_are_tested_on_the_same_ones(make_series, moving,
 
 
 @pytest.mark.slow
-def test_a_study_under_another_smoothing_is_held_against_the_same_samples(
-    make_series, moving
-):
+def test_another_smoothing_is_compared_on_the_same_samples(make_series, moving):
     trials = {"S0": [make_series(moving, seed=k) for k in range(3)]}
     fit = FitOptions(gp_points=40, models=(TUSTIN,), draws=0)
     options = StudyOptions(fit=fit, n_jobs=1)
@@ -101,19 +101,19 @@ def test_a_study_under_another_smoothing_is_held_against_the_same_samples(
     assert same > 1.02 * easier
 
 
-def test_tables_have_no_frame_to_be_changed(make_series, moving):
+def test_tables_have_no_frame_choice(make_series, moving):
     with pytest.raises(SettingsError, match="no frame"):
         parse_choice("frame=sole").series(make_series(moving))
 
 
-def test_a_lag_moves_the_forces_only(make_series, moving):
+def test_a_lag_shifts_only_the_forces(make_series, moving):
     series = make_series(moving)
     later = parse_choice("lag=20").series(series)
     np.testing.assert_array_equal(later.v_t, series.v_t[: later.v_t.size])
     np.testing.assert_allclose(later.F_t, series.F_t[10 : 10 + later.F_t.size])
 
 
-def test_only_models_that_a_choice_touches_are_fitted_again():
+def test_only_models_affected_by_a_choice_are_refitted():
     assert TUSTIN not in parse_choice("kernel=as_printed").models
     assert GP_NN not in parse_choice("static_friction=proportional").models
 
@@ -138,7 +138,7 @@ def test_both_studies_stand_side_by_side(both):
     assert "(p " in row[4]
 
 
-def test_numbers_of_both_are_kept_with_their_difference(both):
+def test_results_of_both_studies_are_kept_with_their_difference(both):
     plain = plain_choice(*both)["terrains"]["S0"][TUSTIN]["mae"]
     difference = plain["after"] - plain["before"]
     assert plain["paired"]["difference"] == pytest.approx(difference)

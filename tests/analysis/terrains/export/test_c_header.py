@@ -44,7 +44,7 @@ def test_quantiles_equal_python(header, name):
 
 
 @pytest.mark.parametrize("name", ["S0", "TF"])
-def test_single_precision_is_within_1e_5_of_the_largest_force(tmp_path, name):
+def test_single_precision_forces_are_accurate(tmp_path, name):
     folder = written(tmp_path, is_float=True)
     F_n, v_t = points()
     is_float = np.abs(F_n) < 1e30
@@ -99,7 +99,7 @@ def test_risk_from_rest_equals_python_and_rises_with_the_force(header, name):
     assert (np.diff(risks[:, 0]) >= 0.0).all()
 
 
-def test_the_law_of_break_away_is_tabulated_to_1e_5():
+def test_the_break_away_law_is_tabulated_accurately():
     model = database().terrain("S0").from_rest
     fine = np.linspace(*rest_distances(model)[[0, -1]], 100_003)
     between = np.interp(fine, rest_distances(model), rest_risks(model))
@@ -108,7 +108,7 @@ def test_the_law_of_break_away_is_tabulated_to_1e_5():
     assert np.abs(between - expected).max() <= 1e-5
 
 
-def test_what_is_not_finite_is_refused(header):
+def test_values_that_are_not_finite_are_refused(header):
     bad = np.array([np.nan, np.inf, -np.inf])
     rows = [np.full(9, value) for value in (2.0, 3.0, 0.05)]
     for place, row in enumerate(rows):
@@ -153,7 +153,7 @@ int main(void)
 """
 
 
-def test_belief_equals_the_recognition_of_python(header):
+def test_terrain_recognition_equals_python(header):
     rng = np.random.default_rng(8)
     count = 400
     F_n = rng.uniform(2.0, 6.0, count)
@@ -178,7 +178,7 @@ def test_belief_equals_the_recognition_of_python(header):
     assert answers[-1, 0] > 0.9
 
 
-def test_a_sample_outside_the_tables_is_no_evidence(header):
+def test_a_sample_outside_the_tables_is_not_evidence(header):
     rows = np.array([[4.0, 0.05, 2.0], [4.0, 0.001, 9.0], [np.nan, 0.05, 1.0]])
     program = build(header, BELIEF, *FLAGS)
     done = subprocess.run(
@@ -238,7 +238,7 @@ def test_a_sampled_path_equals_python(header, name, dt):
     assert np.array_equal(codes, known.predict(F_n, v_t).is_extrapolated)
 
 
-def test_a_refused_step_leaves_the_trial_as_it_was(header):
+def test_a_refused_step_leaves_the_trial_unchanged(header):
     F_n, v_t, dt, normal = np.full((4, 9), [[4.0], [0.05], [0.01], [0.5]])
     for column, place, value in (
         (F_n, 1, np.nan),
@@ -267,7 +267,7 @@ def test_a_terrain_without_a_copula_is_not_sampled(tmp_path):
     assert (forces.tolist(), codes.tolist()) == ([0.0] * 3, [-1.0] * 3)
 
 
-def test_names_that_look_like_parts_of_the_header_compile(tmp_path):
+def test_names_resembling_header_identifiers_compile(tmp_path):
     for names in (("rest", "A"), ("quantiles", "quantile"), ("A", "a_forces")):
         folder = tmp_path / names[0]
         folder.mkdir()

@@ -22,7 +22,7 @@ def target(request):
     return request.param
 
 
-def test_both_are_there():
+def test_both_targets_are_exported():
     assert set(parse_targets("c,onnx")) == set(target_names())
 
 
@@ -35,7 +35,7 @@ TARGET = ExportTarget(
 """
 
 
-def test_a_third_target_is_one_file(tmp_path, monkeypatch):
+def test_the_third_target_is_a_single_file(tmp_path, monkeypatch):
     from analysis.terrains.export import targets
 
     (tmp_path / "third.py").write_text(THIRD)
@@ -52,7 +52,7 @@ def test_other_targets_are_refused(text):
         parse_targets(text)
 
 
-def test_a_readme_has_ten_lines_and_says_where_it_is_from(target):
+def test_a_readme_is_short_and_states_its_origin(target):
     lines = target_files(target, export())["README.md"].decode().splitlines()
     assert len(lines) == 10
     assert lines[0].startswith("# ")
@@ -85,17 +85,17 @@ def test_hostile_names_stay_harmless(target):
             assert "rm -rf)`" not in text
 
 
-def test_hostile_names_keep_their_own_in_data(target):
+def test_hostile_names_are_preserved_in_data(target):
     source = json.loads(target_files(target, export(names=HOSTILE))["source.json"])
     assert tuple(source["terrains"]) == HOSTILE
 
 
 @pytest.mark.parametrize("name", ["S0", "S 0", "", "0", "é", *HOSTILE, "x" * 500])
-def test_an_identifier_is_a_word(name):
+def test_an_identifier_is_one_word(name):
     assert re.fullmatch(r"[A-Za-z0-9_]{1,40}", identifiers([name])[name])
 
 
-def test_signs_and_points_of_numbers_are_kept_in_identifiers():
+def test_identifiers_keep_signs_and_points_of_numbers():
     names = ("G12dt+10", "G12dt-10", "G12.5", "dry-10", "a-b")
     words = dict(
         zip(names, ("G12dtp10", "G12dtm10", "G12p5", "drym10", "a_b"), strict=True)
@@ -105,13 +105,13 @@ def test_signs_and_points_of_numbers_are_kept_in_identifiers():
 
 
 @pytest.mark.parametrize("pair", [("S0", "s0"), ("a b", "a_b"), ("é", "ä")])
-def test_two_names_of_one_identifier_are_refused(pair):
+def test_two_names_with_one_identifier_are_refused(pair):
     with pytest.raises(SettingsError, match="are both"):
         identifiers(pair)
 
 
 @pytest.mark.parametrize("text", [*HOSTILE, "", "\n", "é" * 300])
-def test_what_is_shown_is_one_harmless_line(text):
+def test_displayed_text_is_one_harmless_line(text):
     assert re.fullmatch(r"[A-Za-z0-9 .,:()_+?-]{1,60}", shown(text))
 
 

@@ -32,7 +32,7 @@ def runner(path, engine):
 
 @pytest.mark.parametrize("engine", ["reference", "onnxruntime"])
 @pytest.mark.parametrize("name", ["S0", "TF"])
-def test_forces_are_within_1e_5_of_the_largest(folder, name, engine):
+def test_forces_agree_to_single_precision(folder, name, engine):
     F_n, v_t = points()
     usual = (np.abs(F_n) < 1e30) & (v_t < 1e30)
     rows = np.column_stack([F_n, v_t])[usual].astype(np.float32)
@@ -52,7 +52,7 @@ def test_nan_stays_nan(folder, engine, place):
     assert np.isfinite(run(ROW)).all()
 
 
-def test_only_four_operators_and_what_it_is_of(folder):
+def test_the_model_uses_few_operators_and_states_its_origin(folder):
     model = onnx.load(folder / "S0.onnx")
     assert {n.op_type for n in model.graph.node} == {"Gemm", "Max", "Min", "Mul"}
     gemm = [n for n in model.graph.node if n.op_type == "Gemm"]

@@ -26,7 +26,7 @@ def folder(tmp_path_factory):
     return write(tmp_path_factory.mktemp("pages"), "c")
 
 
-def test_the_loop_of_the_controllers_page_bears_the_risk_it_says(folder):
+def test_the_controller_example_has_its_stated_risk(folder):
     program = build(folder, block("controller.md", "c"), *FLAGS)
     rows = "5.0 0.0 0.0\n9.0 0.0 0.0\n0.0 0.0 0.0\nnan 0.0 0.0\n"
     done = subprocess.run(
@@ -45,7 +45,7 @@ def test_the_loop_of_the_controllers_page_bears_the_risk_it_says(folder):
     assert asked[3] == 0.0  # nothing is asked of a foot that is not known
 
 
-def test_the_loop_is_right_in_single_precision_too(tmp_path):
+def test_the_controller_example_is_right_in_single_precision(tmp_path):
     folder = write(tmp_path, "c", is_float=True)
     program = build(folder, block("controller.md", "c"), *FLAGS)
     rows = "5.0 0.0 0.0\n9.0 0.0 0.0\nnan 0.0 0.0\n"
@@ -57,7 +57,7 @@ def test_the_loop_is_right_in_single_precision_too(tmp_path):
     assert asked[2] == 0.0
 
 
-def test_the_loop_is_as_short_as_the_page_says():
+def test_the_controller_example_is_as_short_as_stated():
     code = block("controller.md", "c")
     body = code[code.index("int main") :].splitlines()
     assert len(body) <= 30
