@@ -69,10 +69,12 @@ def is_guarded(address: str) -> bool:
     return scheme == "tls" or is_loopback
 
 
-def _client(address: str) -> Any:  # noqa: ANN401
-    """Connect to the Dask scheduler at `address`."""
-    from distributed import Client
+def require_guarded(address: str) -> None:
+    """Refuse a scheduler that strangers could write to.
 
+    Raises:
+        SettingsError: it is neither on this machine nor reached by TLS.
+    """
     if not is_guarded(address):
         raise SettingsError(
             f"The Dask scheduler {address} is neither on this machine nor reached by "
@@ -80,6 +82,13 @@ def _client(address: str) -> Any:  # noqa: ANN401
             hint="Its replies can execute code here. Name tls://HOST:PORT with "
             "certificates in Dask's configuration, or leave --scheduler out.",
         )
+
+
+def _client(address: str) -> Any:  # noqa: ANN401
+    """Connect to the Dask scheduler at `address`."""
+    from distributed import Client
+
+    require_guarded(address)
     try:
         return Client(address, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:

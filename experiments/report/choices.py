@@ -15,6 +15,7 @@ from analysis.report.sections.sensitivity import (
     parse_choice,
     parse_window,
 )
+from analysis.study.cluster import require_guarded
 from analysis.study.models import REPORTED, FitOptions, parse_models
 from analysis.study.store import ResultStore
 from analysis.study.study import Study, run_study
@@ -87,6 +88,8 @@ def analysis_choices(args: argparse.Namespace) -> AnalysisChoices:
     Raises:
         SettingsError: an option is invalid.
     """
+    if args.scheduler is not None:
+        require_guarded(args.scheduler)
     prepare = PrepareOptions()
     if args.smooth is not None:
         prepare = replace(prepare, smoothing=args.smooth)

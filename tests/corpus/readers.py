@@ -7,6 +7,7 @@ does. It returns or raises a `TractionError`; anything else is a failure.
 import contextlib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from acquisition.clock import SystemClock
 from acquisition.errors import TractionError, TrialFileError
@@ -116,10 +117,12 @@ def _compensate(text: str) -> None:
     build_compensation(rig, text, is_simulated=True)
 
 
-def _table(name: str) -> Callable[[bytes, Path], None]:
+def _table(name: str, **stated: Any) -> Callable[[bytes, Path], None]:
+    """Return a reader of a table whose layout is stated as for `load_tables`."""
+
     def read(data: bytes, folder: Path) -> None:
         (folder / name).write_bytes(data)
-        load_tables([folder / name])
+        load_tables([folder / name], **stated)
 
     return read
 
@@ -250,9 +253,9 @@ READERS: dict[str, Callable[[bytes, Path], None]] = {
     "sensor-calibration": _text(lambda text: sensor_from_toml(text, "sensor.toml")),
     "database": _database,
     "table": _table("trial.csv"),
-    "german-table": _table("trial.csv"),
-    "preamble-table": _table("trial.csv"),
-    "iso-table": _table("trial.txt"),
+    "german-table": _table("trial.csv", separator=";", decimal=","),
+    "preamble-table": _table("trial.csv", skipped=frozenset({1, 2, 3, 4, 6})),
+    "iso-table": _table("trial.txt", separator="\t"),
     "npz": _table("trials.npz"),
     "parquet": _table("trial.parquet"),
     "package": _package,

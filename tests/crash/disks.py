@@ -18,7 +18,7 @@ def disk_attacks() -> list[Attack]:
     """Return rows of power cuts, and of each kind of failing disk."""
     rows = [_power_cuts(1, RunBy.CI)]
     rows += [_power_cuts(seed, RunBy.NIGHTLY) for seed in _NIGHTS]
-    rows += [_failing(kind, 1, 2, RunBy.CI) for kind in KINDS]
+    rows += [_failing(kind, 1, 1, RunBy.CI) for kind in KINDS]
     rows += [_failing(kind, 2, _DISKS, RunBy.NIGHTLY) for kind in KINDS]
     return rows
 

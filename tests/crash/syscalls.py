@@ -189,7 +189,9 @@ class Recording:
             self.operations.append(Write(self._open[descriptor], offset, data))
 
     def write_offset(self, descriptor: int) -> int:
-        """Return where the next write of a descriptor goes."""
+        """Return where the next write of a descriptor goes; 0 outside the folder."""
+        if descriptor not in self._open:
+            return 0
         if descriptor in self._appending:
             return os.fstat(descriptor).st_size
         return os.lseek(descriptor, 0, os.SEEK_CUR)
@@ -359,7 +361,7 @@ def _recorded_calls(recording: Recording):
         return called
 
     def write(descriptor, data):
-        offset = recording.write_offset(descriptor) if descriptor > 2 else 0
+        offset = recording.write_offset(descriptor)
         count = real["write"](descriptor, data)
         recording.written(descriptor, offset, bytes(data[:count]))
         return count

@@ -115,6 +115,7 @@ def test_the_whole_calibration_recovers_the_torques_at_its_own_pace(tmp_path):
     assert errors(out.read_text(), rig)[0] < 0.1
 
 
+@pytest.mark.long
 def test_an_arm_with_all_the_friction_that_was_identified_is_not_taken_for_stuck(
     tmp_path,
 ):

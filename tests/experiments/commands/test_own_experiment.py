@@ -10,7 +10,7 @@ import pytest
 from experiments.session.store import create_session, list_sessions
 from tests.experiments.program import traction
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.long, pytest.mark.timeout(1200)]
 
 MATRIX = """version = "1.0"
 [[factors]]
