@@ -114,7 +114,9 @@ def calibrate(
         StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
     """
     measured = calibration.collect(context)
-    fitted = context.console_loop.run_aside(lambda: calibration.fit(context, measured))
+    fitted = context.console_loop.run_in_background(
+        lambda: calibration.fit(context, measured)
+    )
     calibration.show(context, fitted)
     calibration.check(context, fitted)
     write_new_text(out, calibration.text(context, fitted))

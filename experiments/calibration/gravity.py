@@ -45,7 +45,7 @@ class MeasuredMoments:
 
 
 @dataclass(frozen=True, slots=True)
-class WeighedArm:
+class GravityResult:
     """Result of the gravity calibration.
 
     Attributes:
@@ -99,14 +99,14 @@ def _combine_approaches(
     )
 
 
-def fit(context: CalibrationContext, measured: MeasuredMoments) -> WeighedArm:
+def fit(context: CalibrationContext, measured: MeasuredMoments) -> GravityResult:
     """Fit first moments, and the zeros of the joints to their residuals."""
     constants = context.rig.model.constants
     moments = fit_moments(constants, measured.q, measured.tau)
-    return WeighedArm(measured, moments, zero_errors(constants, measured.q, moments))
+    return GravityResult(measured, moments, zero_errors(constants, measured.q, moments))
 
 
-def show(context: CalibrationContext, weighed: WeighedArm) -> None:
+def show(context: CalibrationContext, weighed: GravityResult) -> None:
     """Print residuals, dry friction and zero errors."""
     _show_residuals(context.console, weighed.fit, weighed.measured)
     _show_zeros(context.console, weighed.zeros)
@@ -140,7 +140,7 @@ def _show_zeros(console: Console, zeros: ZeroErrors) -> None:
     )
 
 
-def check(context: CalibrationContext, weighed: WeighedArm) -> None:
+def check(context: CalibrationContext, weighed: GravityResult) -> None:
     """Refuse a bad fit, a joint zeroed elsewhere, or another tool.
 
     Raises:
@@ -156,7 +156,7 @@ def check(context: CalibrationContext, weighed: WeighedArm) -> None:
     check_drawings(model.constants, weighed.fit.mus, (tool.sensor, tool.foot), q)
 
 
-def text(context: CalibrationContext, weighed: WeighedArm) -> str:
+def text(context: CalibrationContext, weighed: GravityResult) -> str:
     """Return gravity.toml."""
     rig, measured, moments = context.rig, weighed.measured, weighed.fit
     tool = rig.model.tool
@@ -188,6 +188,6 @@ GRAVITY = GuidedCalibration(
     path=lambda settings, _: gravity_path(settings),
     made_anew=("[gravity]", "[friction]"),
     check=check,
-    bare=lambda settings, row: (settings.by_cad().without_friction(), row),
+    bare=lambda settings, row: (settings.with_cad_gravity().without_friction(), row),
     fewest_poses=3,
 )

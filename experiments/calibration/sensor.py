@@ -51,7 +51,7 @@ class MeasuredOrientations:
 
 
 @dataclass(frozen=True, slots=True)
-class WeighedFoot:
+class FootResult:
     """Result of the sensor or foot calibration.
 
     Attributes:
@@ -121,26 +121,24 @@ def _tool(context: CalibrationContext) -> Tool:
     return tool
 
 
-def fit(context: CalibrationContext, measured: MeasuredOrientations) -> WeighedFoot:
+def fit(context: CalibrationContext, measured: MeasuredOrientations) -> FootResult:
     """Fit foot and mounting.
 
     Raises:
         SettingsError: too few or too similar orientations, or constant readings.
     """
     del context
-    return WeighedFoot(measured, measured.fit())
+    return FootResult(measured, measured.fit())
 
 
-def fit_foot(
-    context: CalibrationContext, measured: MeasuredOrientations
-) -> WeighedFoot:
+def fit_foot(context: CalibrationContext, measured: MeasuredOrientations) -> FootResult:
     """Fit a foot on a sensor mounted as in rig.toml; raises as `fit`."""
     tool = _tool(context)
     mounted = measured.fit((tool.sensor_angle, tool.sensor_sign))
-    return WeighedFoot(measured, mounted, measured.fit())
+    return FootResult(measured, mounted, measured.fit())
 
 
-def show_foot(context: CalibrationContext, weighed: WeighedFoot) -> None:
+def show_foot(context: CalibrationContext, weighed: FootResult) -> None:
     """Print the load of the sensor, its mounting, and the residuals."""
     fitted, say = weighed.fit, context.console.say
     com = ", ".join(f"{1e3 * value:.1f}" for value in fitted.com)
@@ -156,7 +154,7 @@ def show_foot(context: CalibrationContext, weighed: WeighedFoot) -> None:
     )
 
 
-def show(context: CalibrationContext, weighed: WeighedFoot) -> None:
+def show(context: CalibrationContext, weighed: FootResult) -> None:
     """Print `show_foot`, and how the mounting differs from rig.toml."""
     show_foot(context, weighed)
     tool, fitted = _tool(context), weighed.fit
@@ -172,7 +170,7 @@ def show(context: CalibrationContext, weighed: WeighedFoot) -> None:
         )
 
 
-def check(context: CalibrationContext, weighed: WeighedFoot) -> None:
+def check(context: CalibrationContext, weighed: FootResult) -> None:
     """Refuse a fit with large residuals.
 
     Raises:
@@ -181,7 +179,7 @@ def check(context: CalibrationContext, weighed: WeighedFoot) -> None:
     check_residual(weighed.fit, is_forced=context.is_forced, free=weighed.free)
 
 
-def text(context: CalibrationContext, weighed: WeighedFoot) -> str:
+def text(context: CalibrationContext, weighed: FootResult) -> str:
     """Return the calibration of the sensor, or of a foot, as TOML."""
     rig, measured = context.rig, weighed.measured
     return sensor_to_toml(

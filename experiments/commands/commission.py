@@ -148,12 +148,12 @@ def _run_steps(
 ) -> int:
     """Run the steps, as many per connection as possible; returns the exit code."""
     from experiments.commissioning.guide import do_step, wanted
-    from experiments.commissioning.procedure import SITTINGS
+    from experiments.commissioning.procedure import CONNECTIONS
     from experiments.run.stop import StopRequestedError
 
     row = settings.row(_terrain(args, settings)).as_container()
     is_anew = args.first is not None
-    for sitting in SITTINGS:
+    for sitting in CONNECTIONS:
         due = [step for step in sitting if step.id in steps]
 
         def work(scene: Scene, due: Sequence[Step] = due) -> int:

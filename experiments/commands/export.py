@@ -183,12 +183,16 @@ def _export_sessions(args: argparse.Namespace, console: Console) -> int:
     from experiments.export.standard_topics import export_standard_topics
     from experiments.export.terrain_database import export_terrains
     from experiments.export.trial_tables import export_sessions
-    from experiments.report.choices import ReportRequest, choose_sessions, tell_missing
+    from experiments.report.choices import (
+        ReportRequest,
+        choose_sessions,
+        report_missing,
+    )
     from experiments.settings.load import load_settings
 
     every = args.to is None and not args.sessions
     sessions = choose_sessions(args.data, args.sessions, every=every)
-    tell_missing(sessions, console, allow_missing=args.allow_missing)
+    report_missing(sessions, console, allow_missing=args.allow_missing)
     if args.to is not None:
         if args.standard_rate:
             export_standard_topics(sessions, args.to, console)

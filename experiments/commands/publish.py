@@ -47,7 +47,11 @@ def run(args: argparse.Namespace) -> int:
     from experiments.export.credits import LICENCES, parse_author
     from experiments.export.publication import PublishRequest, publish_sessions
     from experiments.operator.console import Console
-    from experiments.report.choices import ReportRequest, choose_sessions, tell_missing
+    from experiments.report.choices import (
+        ReportRequest,
+        choose_sessions,
+        report_missing,
+    )
     from experiments.settings.load import load_settings
 
     authors = [parse_author(text) for text in args.author]
@@ -57,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
     console = Console(color=not args.no_color)
     sessions = choose_sessions(args.data, args.sessions, every=args.all)
     order = [row.name for row in load_settings(args.config).matrix.terrains]
-    missing = tell_missing(sessions, console, allow_missing=args.allow_missing)
+    missing = report_missing(sessions, console, allow_missing=args.allow_missing)
     wanted = ReportRequest(args.seed, order, missing=missing)
     publish_sessions(sessions, args.data, args.to, wanted, request, console)
     return 0

@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
     import json
 
     from experiments.operator.console import Console
-    from experiments.rehearsal.judging import analyse, as_plain
+    from experiments.rehearsal.judging import analyse, results_to_json
     from experiments.rehearsal.plan import AcceptancePlan
     from experiments.rehearsal.recording import calibrate_arm, record_study
     from experiments.session.data_files import write_text
@@ -73,7 +73,9 @@ def run(args: argparse.Namespace) -> int:
         console.say(f"friction calibrated and compensated: {plan.config}")
     record_study(plan, folder, console.say)
     results = analyse(plan, folder)
-    write_text(folder / "bands.json", json.dumps(as_plain(plan, results), indent=1))
+    write_text(
+        folder / "bands.json", json.dumps(results_to_json(plan, results), indent=1)
+    )
     return _print(plan, results, folder, console)
 
 

@@ -108,7 +108,7 @@ def _report(args: argparse.Namespace) -> None:
         ReportRequest,
         analysis_choices,
         choose_sessions,
-        tell_missing,
+        report_missing,
     )
     from experiments.report.covariates import KNOWN
     from experiments.report.sessions import report_sessions
@@ -123,7 +123,7 @@ def _report(args: argparse.Namespace) -> None:
     data = Path(args.data)
     sessions = choose_sessions(data, args.sessions, every=args.all)
     order = [row.name for row in load_settings(args.config).matrix.terrains]
-    missing = tell_missing(sessions, console, allow_missing=args.allow_missing)
+    missing = report_missing(sessions, console, allow_missing=args.allow_missing)
     wanted = ReportRequest(
         args.seed,
         order,

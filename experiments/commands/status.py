@@ -54,9 +54,13 @@ def run(args: argparse.Namespace) -> int:
         count_rows,
         facts_of_row,
         find_deviations,
-        see_sessions,
+        summarise_sessions,
     )
-    from experiments.session.summaries import Checksums, glance_sessions, recorded_facts
+    from experiments.session.summaries import (
+        Checksums,
+        recorded_facts,
+        summarise_all_unverified,
+    )
     from experiments.session.upcoming import next_steps
     from experiments.session.where import check_values, parse_where
     from experiments.settings.load import load_settings
@@ -67,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
     console = Console(color=not args.no_color)
 
     def look() -> StatusTable:
-        seen = see_sessions(args.data, where, digest)
+        seen = summarise_sessions(args.data, where, digest)
         lines = count_rows(seen, matrix, where)
         folders = [s.folder for s in seen]
         terrains = {row.name for row in matrix.terrains}
@@ -79,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
         return StatusTable(lines, notes, steps, find_deviations(seen, where))
 
     if where:
-        seen = glance_sessions(args.data)
+        seen = summarise_all_unverified(args.data)
         facts = [facts_of_row(row) for row in matrix.terrains]
         facts += [s.facts | recorded_facts(s.folder, where) for s in seen]
         check_values(where, [*facts, {"kind": "live"}, {"kind": "simulated"}])

@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     from experiments.calibration.guiding import check_new, guide_person
     from experiments.calibration.options import check_arm
     from experiments.calibration.place import place_calibration
-    from experiments.settings.load import load_unplaced
+    from experiments.settings.load import load_untaught
 
     check_arm(args)
     friction_share(args)
@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
             hint="Small letters, digits, - and _, a letter first, e.g. bay2. Nothing "
             "was started.",
         )
-    settings, row = load_unplaced(args.config, args.place, args.foot)
+    settings, row = load_untaught(args.config, args.place, args.foot)
     calibration = place_calibration(args.place)
     out = args.to or calibration.default_path(settings, row, is_fake=args.fake)
     check_new(out)

@@ -29,15 +29,15 @@ from wam.driver.puck_properties import (
     shipped_table,
 )
 
-LISTENED = 10.0  # s, duration of C1
+LISTEN_SECONDS = 10.0  # s, duration of C1
 _PORTION = 0.5  # s, period of the progress bar
 ASKED = 3  # requests for the same property, to find duplicate nodes
-LOOPED = 60  # s, duration of the loop in C3
+LOOP_SECONDS = 60  # s, duration of the loop in C3
 IDLE_DEGREES = (10.0, 50.0)  # °C
 _SILENT = -(2**31)  # stands for a property without a reply
 
 
-def listen(rig: Rig, most: float = LISTENED) -> Iterator[tuple[float, Values]]:
+def listen(rig: Rig, most: float = LISTEN_SECONDS) -> Iterator[tuple[float, Values]]:
     """Listen silently for `most` [s]; yields progress and the recording."""
     frames, seconds = 0, 0.0
     while seconds < most:
@@ -196,13 +196,13 @@ def time_replies(rig: Rig) -> Iterator[tuple[float, Values]]:
     loop_client = rig.backend.loop_client
     reader = rig.shared.cycles.reader()
     cycles = incomplete = 0
-    for second in range(1, LOOPED + 1):
+    for second in range(1, LOOP_SECONDS + 1):
         loop_client.advance(1.0)
         flags = reader.read()["flags"]
         cycles += len(flags)
         incomplete += int((flags & (Flag.ARM_FRESH | Flag.ARM_UNASKED) == 0).sum())
         yield (
-            second / LOOPED,
+            second / LOOP_SECONDS,
             {
                 "replies_ns": np.array(measured.replies_ns, dtype=np.int64),
                 "unasked": np.array(measured.unasked),

@@ -11,7 +11,7 @@ from wam.model.constants import Array
 
 # Initial pose [rad], in which every joint can be turned freely.
 POSE = (0.0, -0.6, 0.0, 2.0, 0.0, 0.0, 0.0)
-CARRIED = 4.0  # s, travel time of a simulated hand from pose to pose
+CARRY_SECONDS = 4.0  # s, travel time of a simulated hand from pose to pose
 _LOW_WORDS = {  # direction to the stop of the smaller angle
     1: "clockwise, seen from above",
     2: "backwards, over the base",
@@ -41,7 +41,7 @@ def collect(scene: Scene) -> Values:
     for joint in range(1, 8):
         scene.show_share((joint - 1) / 7, f"joint {joint}")
         if scene.simulation is not None:
-            scene.simulation.pose(POSE, CARRIED)
+            scene.simulation.pose(POSE, CARRY_SECONDS)
             scene.await_hand()
         scene.ask(
             f"Joint {joint} {_LOW_WORDS[joint]}, onto its stop, the others as they "

@@ -61,7 +61,7 @@ class RecordFolder:
 
     def tell(self, name: str, when: datetime) -> None:
         """Write that a person reported a change of a basis of `order.BASES`."""
-        self.record = self.record.with_told(name, when)
+        self.record = self.record.with_reported_change(name, when)
         write_commissioning(self.folder, self.record)
 
 
@@ -99,7 +99,7 @@ def do_step(scene: Scene, step: Step, files: RecordFolder, operator: str) -> Jud
     name = f"commissioning_{step.id}_{ended:%Y%m%dT%H%M%S}.npz"
     raw = write_raw(files.folder, name, values)
     present = scene.inputs()
-    present |= files.record.told_inputs()
+    present |= files.record.reported_inputs()
     files.keep(
         StepRecord(
             step=step.id,

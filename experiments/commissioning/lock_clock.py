@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.ipc.shared_sensor import unpack_wrenches
-from experiments.commissioning.by_hand import CARRIED
+from experiments.commissioning.by_hand import CARRY_SECONDS
 from experiments.commissioning.evidence.order import StepId
 from experiments.commissioning.fits import orientations
 from experiments.commissioning.judging import Judgement, found, judged
@@ -27,7 +27,7 @@ from experiments.run.ready import activate
 from wam.model.arm_model import ArmModel
 from wam.model.constants import GRAVITY, Array, load_constants
 
-ROCKED = 10.0  # s, duration of rocking
+ROCKING_SECONDS = 10.0  # s, duration of rocking
 _POSE = 1  # index of `POSES`: the foot ahead
 # At 1 Hz the hysteresis of a sound sensor looks like a lag of up to 4 ms.
 _AMPLITUDE, _HALF = 0.3, 1.0 / 3.0  # rad, and s of half a period
@@ -52,7 +52,7 @@ def collect(scene: Scene) -> Values:
     scene.say("Bring the foot above the container, a hand's breadth clear of it.")
     if scene.simulation is not None:
         start = start_of(scene.rig.row, scene.rig.model)
-        scene.simulation.pose(start.tolist(), CARRIED)
+        scene.simulation.pose(start.tolist(), CARRY_SECONDS)
         scene.await_hand()
     turned: dict[str, NDArray[Any]] = {}
     with scene.followed():
@@ -71,12 +71,12 @@ def _rock(scene: Scene) -> Values:
     scene.ask(
         f"Rock the foot about joint 6, {_AMPLITUDE:g} rad to both sides, three times "
         "in two seconds, with a hand on the wrist and none on the foot. [space], then "
-        f"{ROCKED:g} s."
+        f"{ROCKING_SECONDS:g} s."
     )
     cycles = scene.rig.shared.cycles.reader()
     wrenches = scene.loop_client.wrenches()
     side = 1.0
-    for _ in range(round(ROCKED / _HALF)):
+    for _ in range(round(ROCKING_SECONDS / _HALF)):
         if scene.simulation is not None:
             pose = list(POSES[_POSE])
             pose[5] += side * _AMPLITUDE

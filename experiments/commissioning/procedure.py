@@ -20,7 +20,7 @@ from experiments.commissioning.stop_circuit import STOP_CIRCUIT
 from experiments.commissioning.weights import HUNG_WEIGHT, OWN_WEIGHT
 
 # Steps that share one connection to the rig. The stop button cuts power and positions.
-SITTINGS: tuple[tuple[Step, ...], ...] = (
+CONNECTIONS: tuple[tuple[Step, ...], ...] = (
     (CONFIGURATION, LISTEN, IDENTITY, TIMING),
     (STOP_CIRCUIT,),
     (BY_HAND, OWN_WEIGHT, HUNG_WEIGHT),
@@ -30,5 +30,5 @@ SITTINGS: tuple[tuple[Step, ...], ...] = (
     (PLATE,),
 )
 STEPS: Mapping[StepId, Step] = {
-    step.id: step for sitting in SITTINGS for step in sitting
+    step.id: step for sitting in CONNECTIONS for step in sitting
 }

@@ -9,7 +9,7 @@ import numpy as np
 
 from acquisition.errors import PreflightError
 from acquisition.ipc.shared_sensor import unpack_wrenches
-from experiments.commissioning.by_hand import CARRIED
+from experiments.commissioning.by_hand import CARRY_SECONDS
 from experiments.commissioning.evidence.order import StepId
 from experiments.commissioning.fits import FITTED, fit_foot, fit_hung
 from experiments.commissioning.judging import Judgement, found, judged
@@ -112,7 +112,7 @@ def bring(scene: Scene, pose: Sequence[float], where: str) -> None:
         "nothing touches the foot. [space] when it is still."
     )
     if scene.simulation is not None:
-        scene.simulation.pose(pose, CARRIED)
+        scene.simulation.pose(pose, CARRY_SECONDS)
         scene.await_hand()
         scene.wait(SETTLED)
 

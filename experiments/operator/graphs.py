@@ -114,7 +114,7 @@ def bars(heights: NDArray[np.float64]) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class WayTrace:
+class TravelTrace:
     """A quantity over the travel along the container.
 
     Attributes:
@@ -129,7 +129,7 @@ class WayTrace:
 
 
 def trace_lines(
-    trace: WayTrace, kept: Sequence[NDArray[np.float64]], name: str, width: int
+    trace: TravelTrace, kept: Sequence[NDArray[np.float64]], name: str, width: int
 ) -> list[str]:
     """Return a trace in `width` columns, with the median of the kept ones.
 

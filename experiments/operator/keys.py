@@ -70,7 +70,7 @@ class OperatorKey:
         return label + reasons if self.operand is Operand.REASON else label
 
 
-MOST_STEPS = 9  # steps of a reset, each ticked by its digit
+MAX_STEPS = 9  # steps of a reset, each ticked by its digit
 _CONFIRM = OperatorKey(" ", KeyAction.CONFIRM)
 _QUIT = OperatorKey("q", KeyAction.QUIT, "quit")
 _UNDO = OperatorKey("u", KeyAction.UNDO, "take the newest verdict back, for 10 s")
@@ -121,7 +121,7 @@ KEYS: Mapping[Prompt, tuple[OperatorKey, ...]] = {
         ),
         _UNDO,
         OperatorKey("1", KeyAction.TICK, "to `9` tick a step of the reset"),
-        *(OperatorKey(str(n), KeyAction.TICK) for n in range(2, MOST_STEPS + 1)),
+        *(OperatorKey(str(n), KeyAction.TICK) for n in range(2, MAX_STEPS + 1)),
     ),
     Prompt.PAUSED: (_CONFIRM, _QUIT),
     Prompt.DAMPED: (

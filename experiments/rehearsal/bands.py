@@ -105,7 +105,7 @@ BANDS = (
 )
 
 
-def hold_against_bands(measures: Mapping[str, Sequence[float]]) -> list[BandResult]:
+def compare_with_bands(measures: Mapping[str, Sequence[float]]) -> list[BandResult]:
     """Return every band with its measured values, in order.
 
     Args:

@@ -13,7 +13,7 @@ from analysis.data.terrain_kinds import FLAT
 from analysis.study.models import GP_SE, TUSTIN, FitOptions
 from analysis.study.study import Study, StudyOptions, run_study
 from experiments.arguments import FRICTION
-from experiments.rehearsal.bands import Band, BandResult, hold_against_bands
+from experiments.rehearsal.bands import Band, BandResult, compare_with_bands
 from experiments.rehearsal.model_measures import measure_models
 from experiments.rehearsal.plan import AcceptancePlan
 from experiments.rehearsal.slip_measures import GroundTrials, measure_slips
@@ -77,13 +77,15 @@ def analyse(plan: AcceptancePlan, data: Path) -> list[BandResult]:
         for prepared, recorded in zip(result.trials, trials[name], strict=True)
     )
     doubts = BandResult(DOUBT_BAND, (doubted,))
-    results = [*hold_against_bands(measures), *_truth(trials), doubts]
+    results = [*compare_with_bands(measures), *_truth(trials), doubts]
     if is_whole:
         return results
     return [f for f in results if f.band.id[0] in _OF_FEW and f.band.id != "E7"]
 
 
-def as_plain(plan: AcceptancePlan, results: Sequence[BandResult]) -> dict[str, object]:
+def results_to_json(
+    plan: AcceptancePlan, results: Sequence[BandResult]
+) -> dict[str, object]:
     """Return plan and results as values for JSON."""
     return {
         "plan": {**asdict(plan), "config": str(plan.config or "shipped default")},

@@ -173,7 +173,7 @@ def choose_sessions(
     return sessions
 
 
-def tell_missing(
+def report_missing(
     sessions: Sequence[SessionFolder], console: Console, *, allow_missing: bool
 ) -> list[str]:
     """Print and return messages on missing or changed kept trials.

@@ -36,10 +36,10 @@ from wam.driver.arm import WamArm
 from wam.driver.startup import ArmInfo
 from wam.driver.survey import Answers, RestTraffic
 
-UNASKED_EVERY = 20  # one cycle in so many omits the position request
+UNREQUESTED_EVERY = 20  # one cycle in so many omits the position request
 _AGE_CYCLES = 5  # cycles without requests at the end
 _QUESTIONS = 3  # timed property requests to each puck
-_EXCHANGE_PERIODS = EXCHANGE_CYCLES + (EXCHANGE_CYCLES - 1) // (UNASKED_EVERY - 1)
+_EXCHANGE_PERIODS = EXCHANGE_CYCLES + (EXCHANGE_CYCLES - 1) // (UNREQUESTED_EVERY - 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +142,7 @@ class ArmService:
         unasked = late = jumps = 0
         is_judged = False  # complete, and no other master on the bus
         for number, _ in enumerate(self._periods(_EXCHANGE_PERIODS), 1):
-            is_without_request = number % UNASKED_EVERY == 0
+            is_without_request = number % UNREQUESTED_EVERY == 0
             now_ns = clock.now_ns()
             reading = arm.skip(now_ns) if is_without_request else arm.read(now_ns)
             if not is_without_request:

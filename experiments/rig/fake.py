@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class RigTruth:
+class TrueDeviations:
     """True deviations of a simulated rig from its settings.
 
     Attributes:
@@ -78,7 +78,7 @@ class SimulatedRig:
     friction: float
     pace: str
     cables: float | None = None
-    truth: RigTruth | None = None
+    truth: TrueDeviations | None = None
 
     def metadata(self) -> dict[str, Any]:
         """Return the simulation as plain values, for another process."""
@@ -118,7 +118,7 @@ def wrong_rigs() -> dict[str, str]:
     return {name: f"{rig.wrong} ({rig.cause})" for name, rig in catalogue().items()}
 
 
-def typed_wrongly(settings: Settings, wrong: str) -> Settings:
+def with_typing_error(settings: Settings, wrong: str) -> Settings:
     """Return the settings of the wrong rig of that name, with its typing error.
 
     Raises:
@@ -234,7 +234,7 @@ class ServedArm:
     is_at_rest: bool = False
     friction: float | None = None
     seed: int | None = None
-    truth: RigTruth | None = None
+    truth: TrueDeviations | None = None
 
 
 def _served_tool(settings: Settings, tool: str) -> Tool | None:

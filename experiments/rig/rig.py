@@ -20,10 +20,10 @@ from experiments.rig.build import (
     terrain_frame,
 )
 from experiments.rig.fake import (
-    RigTruth,
     SimulatedRig,
+    TrueDeviations,
     stepped,
-    typed_wrongly,
+    with_typing_error,
 )
 from experiments.rig.law_calibrations import (
     LawCalibrations,
@@ -67,12 +67,12 @@ class FakeOptions:
     wrong: str = ""
 
     @property
-    def truth(self) -> RigTruth | None:
+    def truth(self) -> TrueDeviations | None:
         """True deviations of the rig from its settings; None = none."""
         if not (self.spread or self.wrong or self.mount):
             return None
         spread = self.spread or bool(self.wrong)
-        return RigTruth(spread, self.mount or (0.0, 0.0, 0.0), self.wrong)
+        return TrueDeviations(spread, self.mount or (0.0, 0.0, 0.0), self.wrong)
 
 
 @dataclass(slots=True)
@@ -140,7 +140,7 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
     if fake is not None:  # the simulation is built from uncalibrated settings
         world = _world(settings, row.name, fake)
     if fake is not None and fake.wrong:
-        settings = typed_wrongly(settings, fake.wrong)
+        settings = with_typing_error(settings, fake.wrong)
     settings = with_calibrations(settings, is_simulated=is_simulated)
     calibrations = read_law_calibrations(settings)
     row = settings.row(row.name)

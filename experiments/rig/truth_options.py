@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from experiments.arguments import did_you_mean, number_within
 
 if TYPE_CHECKING:
-    from experiments.rig.fake import RigTruth
+    from experiments.rig.fake import TrueDeviations
 
 _HELP = "help"
 _DEGREES = number_within(-180.0, 180.0, "degrees -180..180, e.g. 90")
@@ -91,15 +91,15 @@ def mount_of(args: Namespace) -> tuple[float, float, float] | None:
     return x, y, z
 
 
-def truth_of(args: Namespace, seed: int | None) -> RigTruth | None:
+def truth_of(args: Namespace, seed: int | None) -> TrueDeviations | None:
     """Return the true deviations of a served arm; None = none.
 
     With a seed or a defect the arm is drawn from the population of sound ones.
     """
-    from experiments.rig.fake import RigTruth
+    from experiments.rig.fake import TrueDeviations
 
     mount = mount_of(args)
     is_drawn = seed is not None or bool(args.wrong)
     if not is_drawn and mount is None:
         return None
-    return RigTruth(is_drawn, mount or (0.0, 0.0, 0.0), args.wrong)
+    return TrueDeviations(is_drawn, mount or (0.0, 0.0, 0.0), args.wrong)

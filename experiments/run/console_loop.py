@@ -297,7 +297,7 @@ class ConsoleLoop:
         self.loop_client.request(ArmState.HOLD)
         self.loop_client.advance(0.1)
 
-    def run_aside(self, work: Callable[[], _T]) -> _T:
+    def run_in_background(self, work: Callable[[], _T]) -> _T:
         """Run slow `work` in a thread, with the console's heartbeat going on.
 
         Raises:

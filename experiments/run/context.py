@@ -140,7 +140,9 @@ class RunServices:
         Raises:
             SessionError, TrialFileError: as `Journal.append`.
         """
-        self.console_loop.run_aside(lambda: self.journal.append(event, **details))
+        self.console_loop.run_in_background(
+            lambda: self.journal.append(event, **details)
+        )
 
     def record_verdict(self, event: Event, name: TrialName, reason: str) -> None:
         """Append a verdict to the journal, which updates the files of the trial."""
@@ -181,7 +183,7 @@ class RunContext(RunServices):
         """Message on why the guard stopped the arm, and on what is safe."""
         bus = self.loop_client.loop.bus_condition
         faults = self.console_loop.faults
-        is_rehearsed = faults is not None and faults.are_any
+        is_rehearsed = faults is not None and faults.were_planned
         load = busy_load(self.rig, is_rehearsed=is_rehearsed)
         context = replace(
             self.state.fault_context,

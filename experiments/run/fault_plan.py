@@ -14,7 +14,7 @@ _PATTERN = re.compile(
     r"^(?P<name>[a-z0-9-]+)(@T(?P<trial>\d+)\+(?P<seconds>\d+(\.\d+)?)s?)?$"
 )
 # Faults that the preflight detects.
-AT_PREFLIGHT = frozenset(
+PREFLIGHT_FAULTS = frozenset(
     {"can-down", "ft-silent", "locked", "not-zeroed"}
     | {"puck-missing", "puck-hot", "puck-error"}
 )
@@ -63,16 +63,16 @@ class PlannedFaults:
         plans: pending faults.
         devices: injects faults of the simulated rig.
         host_faults: injects faults of the computer.
-        are_any: whether any fault was planned, pending or not.
+        were_planned: whether any fault was planned, pending or not.
     """
 
     plans: list[FaultPlan]
     devices: SimulationControl
     host_faults: HostFaults
-    are_any: bool = field(init=False)
+    were_planned: bool = field(init=False)
 
     def __post_init__(self) -> None:
-        self.are_any = bool(self.plans)
+        self.were_planned = bool(self.plans)
 
     def inject_due(self, moment: FaultTrigger, trial: int, seconds: float) -> None:
         """Inject the faults due `seconds` after the start of a step of `trial`."""
@@ -81,7 +81,7 @@ class PlannedFaults:
                 self.plans.remove(plan)
                 self._inject(plan)
 
-    def inject_first(self) -> None:
+    def inject_preflight(self) -> None:
         """Inject the faults planned before the preflight."""
         for plan in [plan for plan in self.plans if plan.trial == 0]:
             self.plans.remove(plan)
@@ -111,7 +111,7 @@ def parse_fault(text: str, known: Sequence[str]) -> FaultPlan:
     name = match["name"]
     if match["trial"]:
         return FaultPlan(name, int(match["trial"]), float(match["seconds"]))
-    if name in AT_PREFLIGHT:
+    if name in PREFLIGHT_FAULTS:
         return FaultPlan(name, 0, 0.0)
     plan = FaultPlan(name, 1, 0.0)
     return FaultPlan(name, 1, _DEFAULT_SECONDS[plan.moment])
@@ -131,5 +131,5 @@ def plan_faults(
     faults = PlannedFaults(
         [parse_fault(t, known) for t in texts], simulation, host_faults
     )
-    faults.inject_first()
+    faults.inject_preflight()
     return faults

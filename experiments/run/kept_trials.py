@@ -7,28 +7,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.data.load import RecordedTrial
-from experiments.operator.graphs import KeptRow, WayTrace
+from experiments.operator.graphs import KeptRow, TravelTrace
 from experiments.session.derivation import kept_sidecars
 from experiments.session.store import SessionFolder
 
 TRACE_CELLS = 72  # sections of the travel in a trace
 
 
-def traces_of(trial: RecordedTrial) -> tuple[WayTrace, ...]:
+def traces_of(trial: RecordedTrial) -> tuple[TravelTrace, ...]:
     """Largest |F_t| and |v_t| in every section of the travel, shape (72,) each."""
     share = trial.displacement / trial.frame.travel
     cells = np.floor(share * TRACE_CELLS).astype(int)
-    traces: list[WayTrace] = []
+    traces: list[TravelTrace] = []
     for name, unit, column in (("F_t", "N", 1), ("v_t", "m/s", 0)):
         values = np.full(TRACE_CELLS, np.nan)
         values_abs = np.abs(trial.traction[:, column])
         is_inside = (cells >= 0) & (cells < TRACE_CELLS) & np.isfinite(values_abs)
         np.fmax.at(values, cells[is_inside], values_abs[is_inside])
-        traces.append(WayTrace(name, unit, values))
+        traces.append(TravelTrace(name, unit, values))
     return tuple(traces)
 
 
-def plain_trace(trace: WayTrace) -> list[float | None]:
+def trace_to_json(trace: TravelTrace) -> list[float | None]:
     """Return the values of a trace for JSON, None without a sample."""
     return [round(v, 4) if np.isfinite(v) else None for v in trace.values.tolist()]
 

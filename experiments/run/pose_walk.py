@@ -16,7 +16,7 @@ from wam.calibration.poses import APPROACH_SPEED, MeasurementPose, travel_time
 from wam.control.position_control import JointMove, move_reference
 from wam.model.constants import Array
 
-WEIGHED = 0.3  # s, duration of a reading of the free foot
+WEIGHING_SECONDS = 0.3  # s, duration of a reading of the free foot
 SETTLE = 0.5  # s after a move
 STILL = 0.02  # rad/s, largest joint speed while something is averaged
 # rad, tolerance of the joints during a move; a gravity error of a quarter and the
@@ -72,7 +72,7 @@ class PoseWalk:
         """
         start = self._rig.backend.loop_client.latest()["position"][0].copy()
         space = free_space(self._rig.settings, self._rig.row)
-        halts = self.console_loop.run_aside(lambda: plan(start, space))
+        halts = self.console_loop.run_in_background(lambda: plan(start, space))
         number = len({halt.pose for halt in halts} - {None})
         stops = len(halts) * SETTLE + number * seconds_per_pose
         # Position control: the weight may not be known yet, and the operator lets go.
@@ -94,7 +94,7 @@ class PoseWalk:
         """
         loop_client = self._rig.backend.loop_client
         reader = loop_client.wrenches()
-        self.wait(WEIGHED)
+        self.wait(WEIGHING_SECONDS)
         readings = [
             sample.wrench
             for sample in unpack_wrenches(reader.read())
@@ -127,7 +127,7 @@ class PoseWalk:
         except ArmFaultError as fault:
             raise MoveStoppedError(fault.verdict) from fault
         self._target = halt.q
-        self._require_free(WEIGHED)
+        self._require_free(WEIGHING_SECONDS)
 
     def _require_free(self, seconds: float) -> None:
         """Refuse to go on while something pushes the foot; the arm is idled then.

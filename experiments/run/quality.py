@@ -35,15 +35,15 @@ from analysis.data.quality import (
     thinnest,
 )
 from experiments.operator.console import BAD, GOOD, WARNING
-from experiments.operator.graphs import WayTrace, trace_lines
-from experiments.run.kept_trials import plain_trace, traces_of
+from experiments.operator.graphs import TravelTrace, trace_lines
+from experiments.run.kept_trials import trace_to_json, traces_of
 from experiments.session.derivation import kept_sidecars
 from experiments.session.store import SessionFolder
 
 STALE_SHARE = 0.01  # of the cycles
-ENOUGH_EARLIER = 3  # trials needed to call another one an outlier
+MIN_EARLIER = 3  # trials needed to call another one an outlier
 ODD = 3.0  # standard deviations
-LEAST_SPREAD = 0.05  # of the mean; few trials may agree by chance
+MIN_SPREAD = 0.05  # of the mean; few trials may agree by chance
 CELLS = (4, 4)  # speed and load cells of a coverage
 MANY = 1_000_000_000  # samples, limit of a plausible count
 
@@ -82,21 +82,21 @@ class Review:
     doubts: tuple[Doubt, ...] = ()
     lag: ForceLag | None = None
     v_t: float = np.nan
-    traces: tuple[WayTrace, ...] = ()
+    traces: tuple[TravelTrace, ...] = ()
 
     @property
-    def known_ratio(self) -> float | None:
+    def ratio_or_none(self) -> float | None:
         """The slope, None if it is NaN."""
         return self.ratio if np.isfinite(self.ratio) else None
 
     def plain(self) -> dict[str, object]:
         """Return the figures for the journal, used by the table and later reviews."""
         return {
-            "ratio": self.known_ratio,
+            "ratio": self.ratio_or_none,
             "coverage": self.counts.tolist(),
             "slips": self.slips,
             "v_t": None if np.isnan(self.v_t) else round(self.v_t, 4),
-            "traces": {trace.name: plain_trace(trace) for trace in self.traces},
+            "traces": {trace.name: trace_to_json(trace) for trace in self.traces},
         }
 
     def trace_lines(
@@ -174,10 +174,10 @@ class Review:
         if self.doubts:
             return WARNING, f"{words}, not vouched for"
         valid = [ratio for ratio in earlier if _is_friction(ratio)]
-        if len(valid) < ENOUGH_EARLIER:
+        if len(valid) < MIN_EARLIER:
             return GOOD, words
         mean, spread = float(np.mean(valid)), float(np.std(valid, ddof=1))
-        is_outlier = abs(self.ratio - mean) > ODD * max(spread, LEAST_SPREAD * mean)
+        is_outlier = abs(self.ratio - mean) > ODD * max(spread, MIN_SPREAD * mean)
         words += f" ({len(valid)} before: {mean:.2f} ± {spread:.2f})"
         return WARNING if is_outlier else GOOD, words
 
@@ -224,7 +224,7 @@ def _median_speed(prepared: PreparedTrial) -> float:
     return float(np.median(speeds)) if len(speeds) else np.nan
 
 
-def thin_so_far(folder: SessionFolder) -> str:
+def thinnest_cell(folder: SessionFolder) -> str:
     """Name the cell of speed and load with the fewest samples of a session."""
     counts = np.zeros(CELLS, np.int64)
     for sidecar in kept_sidecars(folder):

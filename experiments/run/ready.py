@@ -13,7 +13,7 @@ from experiments.operator.screens import ReadyView, ready_lines
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import RunContext, RunServices
 from experiments.run.kept_trials import kept_rows
-from experiments.run.quality import review_trial, thin_so_far
+from experiments.run.quality import review_trial, thinnest_cell
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.run.verdicts import take_note
 from experiments.session.sidecar import TrialName
@@ -93,7 +93,7 @@ def ready_view(context: RunContext) -> ReadyView:
     """Return the present content of the screen between two trials."""
     state, row = context.journal.state, context.rig.row
     folder = context.metadata.folder
-    thin = context.console_loop.run_aside(lambda: thin_so_far(folder))
+    thin = context.console_loop.run_in_background(lambda: thinnest_cell(folder))
     return ReadyView(
         session=folder.id,
         terrain=row.name,
@@ -168,7 +168,7 @@ def _view_last(context: RunContext, name: TrialName) -> None:
             context.say("There is no trial to look at yet.")
             return
         path = folder.path / f"{kept[-1].place}.mcap"
-        review = context.console_loop.run_aside(lambda: review_trial(path))
+        review = context.console_loop.run_in_background(lambda: review_trial(path))
         lines = [f" {mark} {text}" for mark, text in review.lines()]
         context.say_page([f"{path.stem}, recorded before:", *lines])
         return

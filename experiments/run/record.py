@@ -192,7 +192,7 @@ def _end(
         recorder.event(30, "friction", line)
     recorder.event(20, "stop", outcome.reason)
     try:
-        verified = context.console_loop.run_aside(
+        verified = context.console_loop.run_in_background(
             lambda: archive.seal(header, name, outcome.reason)
         )
     except TrialFileError as error:
@@ -201,7 +201,7 @@ def _end(
     review = None
     if outcome.status == "complete":
         path = folder.trials / f"{name.kept}.mcap"
-        review = context.console_loop.run_aside(lambda: review_trial(path))
+        review = context.console_loop.run_in_background(lambda: review_trial(path))
         recording |= review.plain()
     details = {"trial": name.number, "attempt": name.attempt}
     context.append(Event.TRIAL_RECORDED, **details, recording=recording)

@@ -12,7 +12,7 @@ from experiments.run.context import open_context
 from experiments.run.ready import activate, wait_ready
 from experiments.run.record import record_trial
 from experiments.run.stop import ArmFaultError, StopRequestedError, UndoRequestedError
-from experiments.run.tare import prove_mounting, take_end_tare, take_tare
+from experiments.run.tare import take_end_tare, take_tare, verify_mounting
 from experiments.run.trial import SessionMetadata
 from experiments.run.verdicts import ask_verdict, await_undo, judge_again
 from experiments.session.data_files import write_text
@@ -80,7 +80,7 @@ class SessionRunner:
         context = self._context
         activate(context.console_loop)
         context.append(Event.ACTIVATED)
-        prove_mounting(context)
+        verify_mounting(context)
         is_over = False
         while not is_over:
             while not context.journal.state.is_over:

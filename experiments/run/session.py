@@ -35,8 +35,8 @@ from experiments.session.lock import session_lock
 from experiments.session.recorded_conditions import write_conditions
 from experiments.session.states import Event
 from experiments.session.store import create_session, session_utc_ns
-from experiments.session.summaries import glance_sessions
-from experiments.session.unbegun import clear_unbegun
+from experiments.session.summaries import summarise_all_unverified
+from experiments.session.unbegun import remove_never_started
 from experiments.session.upcoming import next_steps
 from experiments.session.where import Where
 from experiments.settings.load import Settings
@@ -175,7 +175,7 @@ def _open_journal(
         host_faults.enter_session(mode.journal.folder)
         return replace(mode.journal, clock=rig.clock)
     utc_ns = session_utc_ns()
-    clear_unbegun(request.data, utc_ns)
+    remove_never_started(request.data, utc_ns)
     folder = create_session(
         request.data,
         request.row.name,
@@ -231,7 +231,7 @@ def _print_next(request: SessionRequest, journal: Journal, code: int) -> None:
     is_simulated = journal.folder.is_simulated
     matrix = request.settings.matrix
     try:
-        seen = glance_sessions(request.data)
+        seen = summarise_all_unverified(request.data)
         steps = next_steps(
             request.data, seen, matrix, Where(), is_simulated=is_simulated
         )

@@ -37,7 +37,7 @@ TARE_SECONDS = 1.0
 STILL_SECONDS = 0.3
 STILL_SPEED = 0.01  # m/s
 LIFTED = 0.03  # height above the plane from which the foot counts as lifted [m]
-MOST_TARES = 5  # attempts
+MAX_TARES = 5  # attempts
 
 
 def take_tare(context: RunContext, name: TrialName) -> None:
@@ -48,7 +48,7 @@ def take_tare(context: RunContext, name: TrialName) -> None:
         ArmFaultError, StopRequestedError: as `ConsoleLoop.tick`.
     """
     context.say("Lift the foot clear of everything and keep it still.")
-    for left in reversed(range(MOST_TARES)):
+    for left in reversed(range(MAX_TARES)):
         context.console_loop.inject_faults(FaultTrigger.TARE, name.number, 0.0)
         try:
             _accept(context, name, _measure(context, name))
@@ -79,7 +79,7 @@ def take_end_tare(context: RunContext) -> None:
     context.say(f"▲ {CATALOGUE['no-end-tare'].text({'detail': detail})}")
 
 
-def prove_mounting(services: RunServices) -> None:
+def verify_mounting(services: RunServices) -> None:
     """Verify the mounting of a calibrated sensor by turning the wrist once.
 
     Raises:
@@ -183,7 +183,7 @@ def _mean(services: RunServices, samples: Sequence[WrenchSample]) -> TareResult:
     try:
         return take_mean(samples, limit)
     except TareError as error:
-        stream = services.console_loop.run_aside(rig.backend.sensor_metadata)
+        stream = services.console_loop.run_in_background(rig.backend.sensor_metadata)
         if why := stream.get("trouble", "").rstrip("."):
             raise preflight_error("tare-without-sensor", why=why) from error
         if error.spread is None:

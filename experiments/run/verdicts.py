@@ -11,7 +11,7 @@ from experiments.operator.prompts import Prompt
 from experiments.operator.scripted import NO_PERSONS
 from experiments.run.context import RunContext, RunServices
 from experiments.run.stop import ArmFaultError, StopRequestedError
-from experiments.session.annotations import LONGEST_TEXT, clean_text
+from experiments.session.annotations import MAX_TEXT, clean_text
 from experiments.session.sidecar import TrialName, TrialOutcome
 from experiments.session.states import Event
 
@@ -156,7 +156,7 @@ def take_note(services: RunServices, name: TrialName, *, is_on_trial: bool) -> N
     finally:
         console_loop.show(None)
     try:
-        text = clean_text(text[:LONGEST_TEXT])
+        text = clean_text(text[:MAX_TEXT])
     except SessionError:  # nothing but spaces
         services.say("Nothing noted.")
         return

@@ -18,7 +18,7 @@ from experiments.session.sidecar import KEEP, TrialName
 from experiments.session.states import Event
 from experiments.session.store import SessionFolder
 
-LONGEST_TEXT = 2000  # characters
+MAX_TEXT = 2000  # characters
 _TRIAL = re.compile(r"^T?0*(?P<number>[1-9]\d?)(?P<letters>[a-z]{0,3})$")
 
 
@@ -52,9 +52,9 @@ def clean_text(text: str) -> str:
     """
     words = " ".join(text.split())
     cleaned = "".join(sign for sign in words if sign.isprintable())
-    if not 0 < len(cleaned) <= LONGEST_TEXT:
+    if not 0 < len(cleaned) <= MAX_TEXT:
         raise SessionError(
-            f"The text has {len(cleaned)} characters, expected 1 to {LONGEST_TEXT}.",
+            f"The text has {len(cleaned)} characters, expected 1 to {MAX_TEXT}.",
             hint="Nothing was written.",
         )
     return cleaned

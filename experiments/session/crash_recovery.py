@@ -15,7 +15,9 @@ from experiments.session.states import OPEN, Event, SessionPhase
 from experiments.session.store import SessionFolder
 
 WHO = "traction"  # author of an automatic verdict
-PATIENCE_NS = 20_000_000_000  # to write and verify the longest trial takes a few s
+RECORDER_TIMEOUT_NS = (
+    20_000_000_000  # to write and verify the longest trial takes a few s
+)
 _PAUSE_NS = 20_000_000
 REPLACED = frozenset({".json", ".toml", ".patch", ".txt"})  # as a whole, atomically
 REASON = "the session ended without closing"
@@ -52,7 +54,7 @@ def recover_session(journal: Journal) -> str:
 def _wait_for_recorder(folder: SessionFolder) -> None:
     """Wait until the recorder of a killed console has completed its file."""
     clock = SystemClock()
-    end_ns = clock.now_ns() + PATIENCE_NS
+    end_ns = clock.now_ns() + RECORDER_TIMEOUT_NS
     while is_claimed(folder.trials):
         if clock.now_ns() >= end_ns:
             raise SessionError(

@@ -6,7 +6,7 @@ from acquisition.clock import Clock
 from acquisition.errors import SessionError
 from experiments.session.derivation import derive, sidecar_of
 from experiments.session.reducer import SessionState, apply, refusal, replay
-from experiments.session.sidecar import KEEP, sums_of
+from experiments.session.sidecar import KEEP, checksum_and_size
 from experiments.session.states import Event
 from experiments.session.store import SessionFolder, iso_utc
 
@@ -51,7 +51,7 @@ class Journal:
         sidecars = [
             sidecar_of(self.folder, kept) for kept in after if kept not in before
         ]
-        return sums_of(sidecars[0]) if sidecars else {}
+        return checksum_and_size(sidecars[0]) if sidecars else {}
 
     def saved(self) -> str:
         """Message about the trials that are safe on the disk."""

@@ -11,7 +11,7 @@ from acquisition.errors import SessionError, TrialFileError
 from acquisition.trial_file.data_files import is_there, list_folder
 from experiments.session.data_files import line_faults, read_json, sha256_of
 from experiments.session.reducer import replay
-from experiments.session.sidecar import KEEP, Attempt, TrialName, sums_of
+from experiments.session.sidecar import KEEP, Attempt, TrialName, checksum_and_size
 from experiments.session.states import Event
 from experiments.session.store import JOURNAL_FILE, SUMMARY_FILE, SessionFolder
 
@@ -90,7 +90,7 @@ def _compare(
             attempt = attempt if type(attempt) is int else 1
             name = TrialName(int(stem[1:]), attempt) if stem[1:].isdigit() else None
             if name is not None:  # only the sidecar has the checksum
-                orphan = Attempt(name, sums=sums_of(fields))
+                orphan = Attempt(name, sums=checksum_and_size(fields))
                 faults += _check_trial(folder, orphan, digest)
     return faults
 

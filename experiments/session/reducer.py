@@ -11,7 +11,7 @@ from experiments.session.sidecar import (
     Attempt,
     TrialName,
     Verdict,
-    sums_of,
+    checksum_and_size,
 )
 from experiments.session.states import TABLE, Event, PhaseChange, SessionPhase
 
@@ -350,7 +350,7 @@ def _judge(
     if verdict != KEEP:
         kept = tuple(other for other in kept if other != pair)
     else:
-        attempt = replace(attempt, sums={**attempt.sums, **sums_of(event)})
+        attempt = replace(attempt, sums={**attempt.sums, **checksum_and_size(event)})
         kept = kept if pair in kept else (*kept, pair)
     return replace(state.with_attempt(attempt), kept_attempts=kept)
 

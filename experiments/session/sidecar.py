@@ -173,6 +173,6 @@ class Attempt:
         return fields
 
 
-def sums_of(fields: Mapping[str, object]) -> dict[str, object]:
+def checksum_and_size(fields: Mapping[str, object]) -> dict[str, object]:
     """Return checksum and size of a recording, as far as `fields` state them."""
     return {key: fields[key] for key in _SUMS if type(fields.get(key)) is _SUMS[key]}

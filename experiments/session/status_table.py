@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from experiments.session.store import list_sessions
 from experiments.session.summaries import (
-    SeenSession,
+    SessionEntry,
     facts_of,
     glance,
     recorded_facts,
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 EVERYTHING = Where()
 
 
-def see_sessions(
+def summarise_sessions(
     data: Path, where: Where, digest: Callable[[Path], str]
-) -> list[SeenSession]:
+) -> list[SessionEntry]:
     """Return all sessions below `data`, oldest number first.
 
     Args:
@@ -36,15 +36,15 @@ def see_sessions(
         where: checksums are computed only for sessions with these values.
         digest: function that computes the checksum of a file.
     """
-    seen: list[SeenSession] = []
+    seen: list[SessionEntry] = []
     for folder in list_sessions(data):
         is_asked = where.matches(facts_of(folder))
         summary = summarise(folder, digest) if is_asked else glance(folder)
-        seen.append(SeenSession(folder, summary))
+        seen.append(SessionEntry(folder, summary))
     return _counted_once(seen)
 
 
-def _counted_once(seen: list[SeenSession]) -> list[SeenSession]:
+def _counted_once(seen: list[SessionEntry]) -> list[SessionEntry]:
     """Return the sessions, with trials shared by a copy and its original counted once.
 
     A session with the number of an earlier one does not count.
@@ -57,7 +57,7 @@ def _counted_once(seen: list[SeenSession]) -> list[SeenSession]:
 
     duplicates = repeated_numbers([session.folder for session in seen])
     folders = {s.folder.id: s.folder for s in seen if s.summary.problem is None}
-    result: list[SeenSession] = []
+    result: list[SessionEntry] = []
     for folder, summary in ((s.folder, s.summary) for s in seen):
         # a copy is not sound: it states another id
         is_asked = summary.problem is None and not summary.is_sound
@@ -66,7 +66,7 @@ def _counted_once(seen: list[SeenSession]) -> list[SeenSession]:
         kept = tuple(name for name in summary.kept if name not in again)
         problem = summary.problem or duplicates.get(folder.path)
         counted = replace(summary, kept=kept, problem=problem)
-        result.append(SeenSession(folder, counted))
+        result.append(SessionEntry(folder, counted))
     return result
 
 
@@ -103,7 +103,7 @@ class MatrixRow:
 
 
 def count_rows(
-    seen: Sequence[SeenSession],
+    seen: Sequence[SessionEntry],
     matrix: MatrixSettings,
     where: Where = EVERYTHING,
 ) -> list[MatrixRow]:
@@ -114,7 +114,7 @@ def count_rows(
         matrix: the terrains and their number of trials.
         where: conditions on terrains and sessions.
     """
-    sessions = counted_of(seen, where)
+    sessions = matching_sessions(seen, where)
     rows: list[MatrixRow] = []
     blocks = 1 + matrix.design.repeat_blocks
     for row in matrix.terrains:
@@ -129,7 +129,7 @@ def count_rows(
     return rows
 
 
-def counted_of(seen: Sequence[SeenSession], where: Where) -> list[SeenSession]:
+def matching_sessions(seen: Sequence[SessionEntry], where: Where) -> list[SessionEntry]:
     """Return the readable sessions that match `where`."""
     return [
         s
@@ -139,13 +139,13 @@ def counted_of(seen: Sequence[SeenSession], where: Where) -> list[SeenSession]:
     ]
 
 
-def is_of(session: SeenSession, row: TerrainRow, *, is_simulated: bool) -> bool:
+def is_of(session: SessionEntry, row: TerrainRow, *, is_simulated: bool) -> bool:
     """Return whether a session is of this terrain and kind."""
     folder = session.folder
     return folder.terrain == row.name and folder.is_simulated is is_simulated
 
 
-def find_deviations(seen: Sequence[SeenSession], where: Where) -> list[Deviation]:
+def find_deviations(seen: Sequence[SessionEntry], where: Where) -> list[Deviation]:
     """Return the missing or changed kept trials of the table.
 
     Args:
@@ -168,7 +168,7 @@ def facts_of_row(row: TerrainRow) -> dict[str, Value]:
 
 def _matrix_row(
     row: TerrainRow,
-    sessions: Sequence[SeenSession],
+    sessions: Sequence[SessionEntry],
     wanted: int,
     *,
     is_simulated: bool,

@@ -40,7 +40,7 @@ _FOLDER = re.compile(
     r"(?P<fake>\.fake)?$"
 )
 LONGEST_NAME = 64
-MOST_EVENTS = 50_000
+MAX_EVENTS = 50_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,8 +113,8 @@ class SessionFolder:
         except OSError as error:
             check_absent(path, error)
             return b""
-        if text.count(b"\n") > MOST_EVENTS:
-            raise TrialFileError(path, f"has more than {MOST_EVENTS} lines")
+        if text.count(b"\n") > MAX_EVENTS:
+            raise TrialFileError(path, f"has more than {MAX_EVENTS} lines")
         return text
 
     def events(self) -> list[dict[str, Any]]:

@@ -50,7 +50,7 @@ class SessionSummary:
 
 
 @dataclass(frozen=True, slots=True)
-class SeenSession:
+class SessionEntry:
     """A session and its summary.
 
     Attributes:
@@ -140,9 +140,9 @@ def summarise(
         return SessionSummary(deviations=deviations, problem=unreadable(folder, error))
 
 
-def glance_sessions(data: Path) -> list[SeenSession]:
+def summarise_all_unverified(data: Path) -> list[SessionEntry]:
     """Summarise all sessions below `data` without checksums."""
-    return [SeenSession(folder, glance(folder)) for folder in list_sessions(data)]
+    return [SessionEntry(folder, glance(folder)) for folder in list_sessions(data)]
 
 
 def facts_of(folder: SessionFolder) -> dict[str, Value]:

@@ -16,7 +16,7 @@ _BEFORE = frozenset(
 _YOUNG_NS = 60 * NS_PER_S  # another process may be about to lock it
 
 
-def clear_unbegun(data: Path, utc_ns: int) -> list[str]:
+def remove_never_started(data: Path, utc_ns: int) -> list[str]:
     """Remove folders in which no session ever started; returns their names.
 
     Such a folder contains only files written before the first event, no process has it

@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from analysis.data.terrain_kinds import Value
-    from experiments.session.summaries import SeenSession
+    from experiments.session.summaries import SessionEntry
     from experiments.session.where import Where
     from experiments.settings.matrix import MatrixSettings, TerrainRow
 
 
 def next_steps(
     data: Path,
-    seen: Sequence[SeenSession],
+    seen: Sequence[SessionEntry],
     matrix: MatrixSettings,
     where: Where,
     *,
@@ -70,7 +70,7 @@ def _order_text(order: Sequence[str]) -> str:
     return " ".join(order[:_SHOWN]) + more
 
 
-def _open_elsewhere(session: SeenSession) -> str:
+def _open_elsewhere(session: SessionEntry) -> str:
     """Line on the other process that has a session open; empty if none has."""
     owner = owner_of(session.folder)
     if owner is None or owner.pid == os.getpid():
@@ -81,7 +81,7 @@ def _open_elsewhere(session: SeenSession) -> str:
     )
 
 
-def _resumable(session: SeenSession) -> str:
+def _resumable(session: SessionEntry) -> str:
     """Line on a session to resume; empty if it cannot be resumed."""
     from experiments.session.unfinished import inspect_session
 

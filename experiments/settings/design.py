@@ -42,7 +42,7 @@ from experiments.settings.matrix import (
 from experiments.settings.places import StatedPlace
 
 ABSENT = "-"  # a factor that does not apply
-MOST_CELLS = 400
+MAX_CELLS = 400
 _SAME_INCLINE = 3.0  # degrees, tolerance between a cell and its taught place
 _NOTHING = "Nothing was started."
 _FIELD = re.compile(r"\{([a-z][a-z0-9_]*)(?::([^{}]*))?\}")
@@ -108,7 +108,7 @@ class DesignFile(SettingsSection):
     factors: tuple[DesignFactor, ...] = Field(default=(), max_length=MOST_FACTORS)
     design: Design = Design()
     defaults: dict[str, Any] = Field(default_factory=dict[str, Any])
-    cells: tuple[dict[str, Any], ...] = Field(default=(), max_length=MOST_CELLS)
+    cells: tuple[dict[str, Any], ...] = Field(default=(), max_length=MAX_CELLS)
     crosses: tuple[dict[str, Any], ...] = Field(default=(), max_length=60)
     simulate: _Effects = Field(default_factory=_Effects)
 
@@ -225,8 +225,8 @@ class _Resolver:
             ):
                 raise self._error(f"{table}.{empty}", f"{empty} is an empty list")
             count += math.prod(map(len, lists.values()))
-            if count > MOST_CELLS:
-                raise self._error(table, f"more than {MOST_CELLS} cells")
+            if count > MAX_CELLS:
+                raise self._error(table, f"more than {MAX_CELLS} cells")
             for combination in itertools.product(*lists.values()):
                 chosen = {**values, **dict(zip(lists, combination, strict=True))}
                 chosen["name"] = self._name(chosen, table)

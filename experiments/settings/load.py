@@ -74,7 +74,7 @@ class Settings:
                 "Nothing was started.",
             )
 
-    def by_cad(self) -> "Settings":
+    def with_cad_gravity(self) -> "Settings":
         """Return the settings with the gravity of the drawings, for a calibration."""
         cad = self.rig.gravity.model_copy(update={"model": "cad"})
         return replace(self, rig=self.rig.model_copy(update={"gravity": cad}))
@@ -159,7 +159,7 @@ def load_settings(config: Path | None) -> Settings:
     return Settings(rig, matrix, rig_text, matrix_text, origin, folder)
 
 
-def load_unplaced(
+def load_untaught(
     config: Path | None, place: str, foot: str | None
 ) -> tuple[Settings, TerrainRow]:
     """Load settings with one terrain at a place that is not taught yet.

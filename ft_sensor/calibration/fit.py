@@ -21,7 +21,7 @@ from wam.model.constants import GRAVITY, Array
 
 FEWEST = 6  # orientations
 LARGEST_RESIDUAL = 0.3  # N rms; a sound sensor drifts by 0.2 between two poses
-LEAST_SPREAD = 0.15  # relative smallest singular value of the gravity directions
+MIN_SPREAD = 0.15  # relative smallest singular value of the gravity directions
 _LIGHTEST = 0.02  # kg; smallest mass that is significant
 _COARSE = np.radians(np.arange(-180.0, 180.0, 5.0))
 _FINE_STEPS = 40  # halvings of the bracket around the best coarse angle
@@ -159,7 +159,7 @@ def _directions(rotations: Floats) -> Floats:
         )
     down = -rotations[:, 2, :]
     spread = np.linalg.svd(down - down.mean(axis=0), compute_uv=False)
-    if spread[-1] < LEAST_SPREAD * np.sqrt(len(down) / 3):
+    if spread[-1] < MIN_SPREAD * np.sqrt(len(down) / 3):
         raise SettingsError(
             "The orientations are too similar: the foot has to point up, down and to "
             "all sides.",

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from acquisition.clock import Clock
 from experiments.operator.hand_orders import parse_hand_order
-from experiments.rig.fake import RigTruth, SimulatedRig
+from experiments.rig.fake import SimulatedRig, TrueDeviations
 from experiments.settings.load import Settings
 from fakes.pucks.wire import WiredNetwork
 from fakes.world.plain_world import simulated_rig
@@ -55,7 +55,7 @@ class PushedArm:
             seed,
             friction,
             "steady",
-            truth=RigTruth(wrong=wrong) if wrong else None,
+            truth=TrueDeviations(wrong=wrong) if wrong else None,
         )
         self._clock = WorldClock(clock)
         simulation = simulated_rig(world.metadata(), load_constants(), self._clock)

@@ -25,7 +25,7 @@ from experiments.session.crash_recovery import recover_session
 from experiments.session.data_files import journal_line
 from experiments.session.journal import open_journal
 from experiments.session.lock import session_lock
-from experiments.session.status_table import count_rows, see_sessions
+from experiments.session.status_table import count_rows, summarise_sessions
 from experiments.session.store import list_sessions
 from experiments.session.summaries import Checksums
 from experiments.session.unfinished import find_unfinished
@@ -87,7 +87,7 @@ def _session(folder: Path, name: str, data: bytes, journal: bytes = b"") -> None
     (path / name).write_bytes(data)
     find_unfinished(folder)
     matrix = load_settings(None).matrix
-    count_rows(see_sessions(folder, Where(), Checksums()), matrix)
+    count_rows(summarise_sessions(folder, Where(), Checksums()), matrix)
     (session,) = list_sessions(folder)
     with session_lock(session):
         recover_session(open_journal(session, SystemClock()))

@@ -25,7 +25,7 @@ from analysis.tables.text import LONGEST_LINE
 from analysis.terrains import database
 from experiments.operator.scripted import ScriptedOperator
 from experiments.session.data_files import journal_line, parse_object
-from experiments.session.store import MOST_EVENTS, create_session
+from experiments.session.store import MAX_EVENTS, create_session
 from experiments.settings.calibrations import read_calibration
 from experiments.settings.load import load_settings
 from tests.acquisition.forged import CHUNK, with_chunk
@@ -63,7 +63,7 @@ def test_the_tested_limits_are_the_documented_ones():
     rows = re.findall(r"^  \| .*$", SECURITY, re.MULTILINE)
     for row, stated in zip(rows[1:], STATED, strict=True):  # behind the head
         assert row.strip().endswith(stated)
-    assert (MAX_ROWS, MOST_EVENTS, RECORD_LIMIT) == (300_000, 50_000, 16 * MIB)
+    assert (MAX_ROWS, MAX_EVENTS, RECORD_LIMIT) == (300_000, 50_000, 16 * MIB)
     assert (LARGEST, MOST_BYTES) == (16 * MIB, 256 * MIB)
     assert (LARGEST_FILE, LONGEST_LINE, PARTS) == (24_000_000, 65_536, 8)
     free = share_of_memory(1, 0)

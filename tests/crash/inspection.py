@@ -58,7 +58,7 @@ def events_in(journal: bytes) -> list[dict]:
     return [event for event in map(parse_line, journal.splitlines()) if event]
 
 
-def sums_of(events: Sequence[dict]) -> dict[tuple[int, int], str]:
+def checksum_and_size(events: Sequence[dict]) -> dict[tuple[int, int], str]:
     """Return {(trial, attempt): sha256} of what was ever kept."""
     return {
         (event["trial"], event["attempt"]): event["sha256"]
@@ -114,13 +114,17 @@ def _lost(session: SessionFolder, wanted: Sequence[dict]) -> list[str]:
     events = session.events()
     wrong = [] if events[: len(wanted)] == wanted else ["events are lost"]
     counted = {path.stem: digest(path) for path in session.kept_trials()}
-    sums = sums_of(events)
+    sums = checksum_and_size(events)
     for number, attempt in replay(events).kept_attempts:
         if counted.get(f"T{number:02d}") != sums[number, attempt]:
             wrong.append(f"T{number:02d} of {session.id} does not count")
     files = [*session.trials.glob("*.mcap"), *session.rejected.glob("*.mcap")]
     there = {digest(path) for path in files}
-    lost = [pair for pair, sha256 in sums_of(wanted).items() if sha256 not in there]
+    lost = [
+        pair
+        for pair, sha256 in checksum_and_size(wanted).items()
+        if sha256 not in there
+    ]
     return wrong + [f"attempt {pair} of {session.id} is lost" for pair in lost]
 
 

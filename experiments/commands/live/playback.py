@@ -20,7 +20,12 @@ from experiments.commands.live.channels import (
     LIVE_TOPICS,
     LiveEncoder,
 )
-from experiments.commands.live.server import HOST, LiveServer, PlaybackWish, layout_path
+from experiments.commands.live.server import (
+    HOST,
+    LiveServer,
+    PlaybackRequest,
+    layout_path,
+)
 from experiments.operator.console import Console
 from experiments.operator.graphs import LiveScales
 from experiments.operator.screens import RecordingView, recording_lines
@@ -126,14 +131,14 @@ class _Player:
     """
 
     t_ns: NDArray[np.int64]
-    wish: PlaybackWish
+    wish: PlaybackRequest
     row: int = -1
     _from: tuple[int, int] = (
         0,
         0,
     )  # real time [ns] and position [UTC ns] of the last change
 
-    def follow(self, wish: PlaybackWish, now_ns: int) -> None:
+    def follow(self, wish: PlaybackRequest, now_ns: int) -> None:
         """Change the mode of playback."""
         at = self.position(now_ns) if wish.seek_ns is None else wish.seek_ns
         at = min(max(at, int(self.t_ns[0])), int(self.t_ns[-1]))
@@ -175,9 +180,9 @@ def serve(
         reader.attachments.get("robot.urdf", b"<robot/>").decode(errors="replace"),
         reader.attachments.get("config.toml", b"").decode(errors="replace"),
     )
-    wishes: deque[PlaybackWish] = deque()
+    wishes: deque[PlaybackRequest] = deque()
     span = (int(t_ns[0]), int(t_ns[-1]))
-    player = _Player(t_ns, PlaybackWish(True, speed, None, None))
+    player = _Player(t_ns, PlaybackRequest(True, speed, None, None))
     server = LiveServer(port, LIVE_TOPICS, span_ns=span, hear=wishes.append)
     console.say(f"Serving {path.stem} at ws://{HOST}:{server.port}. Ctrl-C ends this.")
     console.say(f"Layout for the viewer: {layout_path()}")
@@ -188,7 +193,7 @@ def serve(
             now_ns = clock.now_ns()
             while wishes:
                 player.follow(wishes.popleft(), now_ns)
-                server.tell_playback(
+                server.send_playback(
                     player.wish, player.position(now_ns), is_over=False
                 )
             if tick % _DESCRIBE_EVERY == 0:
@@ -218,7 +223,7 @@ def _send(
         return
     t_ns = int(player.t_ns[row])
     server.publish(encoder.messages(rows.data[row], t_ns), t_ns)
-    server.tell_time(t_ns)
+    server.send_time(t_ns)
     player.row = row
     if player.is_at_end():
-        server.tell_playback(player.wish, t_ns, is_over=True)
+        server.send_playback(player.wish, t_ns, is_over=True)

@@ -26,7 +26,7 @@ def layout_path() -> Path:
 
 
 @dataclass(frozen=True, slots=True)
-class PlaybackWish:
+class PlaybackRequest:
     """Request of a viewer to a playback.
 
     Attributes:
@@ -42,7 +42,7 @@ class PlaybackWish:
     request_id: str | None
 
 
-def _listener(hear: Callable[[PlaybackWish], None]) -> ServerListener:
+def _listener(hear: Callable[[PlaybackRequest], None]) -> ServerListener:
     """Return the listener to viewers' requests, called on a thread of the library."""
     from foxglove.websocket import PlaybackCommand, ServerListener
 
@@ -53,7 +53,7 @@ def _listener(hear: Callable[[PlaybackWish], None]) -> ServerListener:
             asked = playback_control_request
             speed = asked.playback_speed
             hear(
-                PlaybackWish(
+                PlaybackRequest(
                     is_playing=asked.playback_command == PlaybackCommand.Play,
                     speed=speed if speed > 0.0 else 1.0,
                     seek_ns=asked.seek_time,
@@ -100,7 +100,7 @@ class LiveServer:
         topics: Mapping[str, str],
         *,
         span_ns: tuple[int, int] | None = None,
-        hear: Callable[[PlaybackWish], None] | None = None,
+        hear: Callable[[PlaybackRequest], None] | None = None,
     ) -> None:
         """Start serving.
 
@@ -148,11 +148,11 @@ class LiveServer:
         for topic, payload in messages.items():
             self._channels[topic].log(payload, log_time=t_ns)
 
-    def tell_time(self, t_ns: int) -> None:
+    def send_time(self, t_ns: int) -> None:
         """Send the latest time [UTC ns], by which viewers show their lag."""
         self._server.broadcast_time(t_ns)
 
-    def tell_playback(self, wish: PlaybackWish, t_ns: int, *, is_over: bool) -> None:
+    def send_playback(self, wish: PlaybackRequest, t_ns: int, *, is_over: bool) -> None:
         """Send the state of a playback after `wish`, at UTC `t_ns` [ns]."""
         from foxglove.websocket import PlaybackState, PlaybackStatus
 

@@ -183,7 +183,7 @@ def _serve(
             newest = session.newest()
             if newest is not None:
                 server.publish(*newest)
-                server.tell_time(newest[1])
+                server.send_time(newest[1])
             if period % _LOOK_EVERY == 0:
                 now_ns = clock.utc_ns()
                 server.publish(session.description(), now_ns)

@@ -84,10 +84,10 @@ def _cause(
         return "not done"
     if done.verdict == "wrong":
         return done.cause or "failed"
-    inputs = {**inputs, **record.told_inputs()}
+    inputs = {**inputs, **record.reported_inputs()}
     for name in bases_of(step):
         then, current = done.inputs.get(name), inputs.get(name)
-        if then is None and BASES[name].may_be_untold:
+        if then is None and BASES[name].is_optional:
             continue
         if current is not None and then != current:
             when = record.told.get(name)

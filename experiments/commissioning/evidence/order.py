@@ -49,13 +49,13 @@ class Basis:
     Attributes:
         words: description.
         steps: steps that a change makes stale.
-        may_be_untold: whether a device does not always report it: a step recorded
+        is_optional: whether a device does not always report it: a step recorded
             without it is no contradiction.
     """
 
     words: str
     steps: tuple[StepId, ...]
-    may_be_untold: bool = False
+    is_optional: bool = False
 
 
 _S = StepId
@@ -92,7 +92,7 @@ BASES: dict[str, Basis] = {
     "sensor": Basis(
         "kind, serial number or firmware of the wrist sensor",
         (_S.OWN_WEIGHT, _S.HUNG_WEIGHT, _S.LOCK_AND_CLOCK, _S.PLATE),
-        may_be_untold=True,
+        is_optional=True,
     ),
     "[gravity]": Basis(
         "[gravity] of rig.toml or its calibration", (_S.LIFT, _S.GRAVITY_RAMP)

@@ -174,12 +174,12 @@ class Commissioning(RecordPart):
         chained = _chain(steps, self.told)
         return self.model_copy(update={"steps": chained})
 
-    def with_told(self, name: str, when: datetime) -> Self:
+    def with_reported_change(self, name: str, when: datetime) -> Self:
         """Return the commissioning with a reported change of a basis, chained again."""
         told = {**self.told, name: when}
         return self.model_copy(update={"told": told, "steps": _chain(self.steps, told)})
 
-    def told_inputs(self) -> dict[str, str]:
+    def reported_inputs(self) -> dict[str, str]:
         """Digests of the reported changes, by the names of `order.BASES`."""
         return {name: _initial_digest({name: when}) for name, when in self.told.items()}
 

@@ -55,7 +55,9 @@ TOO_MUCH = GuidedCalibration(
 
 def context(*, simulation=None, is_forced=False):
     rig = SimpleNamespace(simulation=simulation)
-    loop = SimpleNamespace(rig=rig, console=Console(), run_aside=lambda work: work())
+    loop = SimpleNamespace(
+        rig=rig, console=Console(), run_in_background=lambda work: work()
+    )
     return CalibrationContext(loop, is_forced=is_forced)
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from experiments.commissioning.by_hand import CARRIED
+from experiments.commissioning.by_hand import CARRY_SECONDS
 from experiments.commissioning.recording import Values
 from experiments.commissioning.scales import PRESSED, PULLED
 from experiments.commissioning.weights import AVERAGE, HUNG, HUNG_AT, POSES, SETTLED
@@ -142,7 +142,7 @@ class HeldArm:
     def _bring(self, pose: Sequence[float]) -> tuple[Array, Array]:
         before = self._q
         after = np.array(pose) + _MISSED * self._random.standard_normal(7)
-        for share in np.linspace(0.0, 1.0, round(CARRIED / _STEP)):
+        for share in np.linspace(0.0, 1.0, round(CARRY_SECONDS / _STEP)):
             self._q = before + share * (after - before)
             self._read()
         return self.told(self._q), self._measure()

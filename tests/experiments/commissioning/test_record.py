@@ -145,11 +145,11 @@ def test_what_is_not_known_now_contradicts_nothing():
 
 @pytest.mark.parametrize("name", TOLD)
 def test_what_a_person_says_makes_its_steps_stale_until_they_are_done_again(name):
-    record = whole().with_told(name, NOON + timedelta(hours=1))
+    record = whole().with_reported_change(name, NOON + timedelta(hours=1))
     found = lacks(record, INPUTS, NOON + timedelta(hours=2))
     assert tuple(lack.step for lack in found) == BASES[name].steps
     assert "changed on 2026-11-26, as told" in found[0].text
-    known = {**INPUTS, **record.told_inputs()}
+    known = {**INPUTS, **record.reported_inputs()}
     for step in BASES[name].steps:
         inputs = {each: known[each] for each in bases_of(step)}
         record = record.with_step(done(step, inputs=inputs))
@@ -157,7 +157,7 @@ def test_what_a_person_says_makes_its_steps_stale_until_they_are_done_again(name
 
 
 def test_what_a_person_said_is_not_taken_out_unseen(tmp_path):
-    record = whole().with_told("cables", NOON + timedelta(hours=1))
+    record = whole().with_reported_change("cables", NOON + timedelta(hours=1))
     write_commissioning(tmp_path, record)
     assert read_commissioning(tmp_path) == record
     path = tmp_path / NAME

@@ -8,7 +8,7 @@ from experiments.operator.graphs import (
     BarScale,
     KeptRow,
     LiveScales,
-    WayTrace,
+    TravelTrace,
     fitted,
     kept_table,
     packed,
@@ -219,7 +219,7 @@ def test_no_key_is_broken(prompt, width):
 
 
 def test_a_trace_stands_above_the_median_of_the_kept_ones():
-    own = WayTrace("F_t", "N", np.array([0.0, 7.0, np.nan, 14.0]))
+    own = TravelTrace("F_t", "N", np.array([0.0, 7.0, np.nan, 14.0]))
     kept = [np.array([7.0, 7.0, 7.0, np.nan]), np.array([7.0, 0.0, 7.0, np.nan])]
     words, mine, theirs = trace_lines(own, [*kept, np.zeros(9)], "T03", 80)
     assert words == "F_t over displacement, full bar 14.0 N; kept: median of 2"
@@ -229,6 +229,6 @@ def test_a_trace_stands_above_the_median_of_the_kept_ones():
 
 @pytest.mark.parametrize("width", [60, 80])
 def test_a_trace_fills_the_terminal_and_not_more(width):
-    own = WayTrace("v_t", "m/s", np.linspace(0.0, 0.5, 72))
+    own = TravelTrace("v_t", "m/s", np.linspace(0.0, 0.5, 72))
     lines = trace_lines(own, [own.values], "T03", width)
     assert max(map(len, lines)) == (width if width < 78 else 78)

@@ -9,7 +9,7 @@ from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import TractionSeries
 from analysis.study.models import GP_SE, TUSTIN, FitOptions
 from analysis.study.study import StudyOptions, run_study
-from experiments.rehearsal.bands import BANDS, Band, BandResult, hold_against_bands
+from experiments.rehearsal.bands import BANDS, Band, BandResult, compare_with_bands
 from experiments.rehearsal.model_measures import measure_models
 from experiments.rehearsal.slip_measures import GroundTrials, measure_slips
 from tests.fakes.point_foot import PointFoot
@@ -41,7 +41,7 @@ def test_a_band_is_met_when_every_value_is_inside(values, is_met):
 
 
 def test_what_was_not_measured_is_not_met():
-    found = hold_against_bands({"A2": [0.4]})
+    found = compare_with_bands({"A2": [0.4]})
     assert [f.band.id for f in found if f.is_met] == ["A2"]
     assert found[-1].text == "none"
 
@@ -61,7 +61,7 @@ def ground(trials, *, is_plate):
 
 def failed(grounds, ids):
     measures = measure_slips(grounds)
-    found = hold_against_bands(measures)
+    found = compare_with_bands(measures)
     return {f.band.id for f in found if f.band.id in ids and not f.is_met}
 
 

@@ -142,13 +142,13 @@ def test_the_heartbeat_goes_on_while_something_slow_is_done():
             pass
         return "done"
 
-    assert loop.run_aside(work) == "done"
+    assert loop.run_in_background(work) == "done"
     assert loop.loop_client.advanced >= 3 * TICK
 
 
 def test_on_stepped_time_no_time_passes_while_something_slow_is_done():
     loop = make_loop(Keys())
-    assert loop.run_aside(lambda: 7) == 7
+    assert loop.run_in_background(lambda: 7) == 7
     assert loop.loop_client.advanced == 0.0
 
 
@@ -158,7 +158,7 @@ def test_what_slow_work_raises_is_raised(is_stepped):
         raise SessionError("no")
 
     with pytest.raises(SessionError):
-        make_loop(Keys(), is_stepped=is_stepped).run_aside(work)
+        make_loop(Keys(), is_stepped=is_stepped).run_in_background(work)
 
 
 @pytest.fixture

@@ -62,7 +62,7 @@ def test_quit_twice_ends_at_once(tmp_path):
 
 
 def test_the_thin_cell_is_shown(tmp_path, monkeypatch):
-    monkeypatch.setattr(ready, "thin_so_far", lambda folder: "slowly")
+    monkeypatch.setattr(ready, "thinnest_cell", lambda folder: "slowly")
     context = make_context(tmp_path, Keys())
     assert ready_view(context).thin == "slowly"
 

@@ -8,7 +8,7 @@ from acquisition.trial_file.reader import TrialReader
 from analysis.data.lag import ForceLag
 from analysis.data.plausibility import Doubt
 from experiments.operator.console import BAD, GOOD, WARNING
-from experiments.run.quality import review_trial, thin_so_far
+from experiments.run.quality import review_trial, thinnest_cell
 from experiments.session.store import create_session
 from tests.disturbances.rewriting import rewrite
 
@@ -99,7 +99,7 @@ def test_a_quick_fit_that_cannot_be_is_never_ticked(first_trial, ratio):
         mark, text = review.lines(earlier)[4]
         assert mark == BAD
         assert "cannot be" in text
-    assert (review.known_ratio is None) == np.isinf(ratio)
+    assert (review.ratio_or_none is None) == np.isinf(ratio)
 
 
 def test_quick_fits_that_cannot_be_are_no_measure_for_others(first_trial):
@@ -181,10 +181,10 @@ def session(data, *coverages, verdict="trial-kept"):
 
 def test_the_samples_of_all_kept_trials_are_counted(tmp_path):
     one = session(tmp_path, [[0, 9, 9, 0], *SPARSE[1:]])
-    assert thin_so_far(one) == "slower than 0.05 m/s, above 5 N"
-    assert thin_so_far(session(tmp_path, SPARSE, FULL)) == ""
+    assert thinnest_cell(one) == "slower than 0.05 m/s, above 5 N"
+    assert thinnest_cell(session(tmp_path, SPARSE, FULL)) == ""
 
 
 def test_rejected_and_damaged_trials_count_nothing(tmp_path):
-    assert thin_so_far(session(tmp_path, SPARSE, verdict="trial-rejected")) == ""
-    assert thin_so_far(session(tmp_path, [[1, 2]], "none", None)) == ""
+    assert thinnest_cell(session(tmp_path, SPARSE, verdict="trial-rejected")) == ""
+    assert thinnest_cell(session(tmp_path, [[1, 2]], "none", None)) == ""

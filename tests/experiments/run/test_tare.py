@@ -20,10 +20,10 @@ from experiments.run.fault_plan import FaultTrigger
 from experiments.run.stop import StopRequestedError
 from experiments.run.tare import (
     known_bias,
-    prove_mounting,
     residual_force,
     take_end_tare,
     take_tare,
+    verify_mounting,
 )
 from experiments.session.sidecar import TrialName
 from experiments.session.states import Event
@@ -60,7 +60,7 @@ def test_a_calibrated_sensor_is_known_with_its_foot_only():
 def test_a_wrist_is_not_turned_for_a_sensor_that_nobody_calibrated(tmp_path):
     context = make_context(tmp_path, Keys())
     context.rig.settings.calibrations, context.rig.row.foot = {}, "tread"
-    prove_mounting(context)
+    verify_mounting(context)
     assert (context.loop_client.requested, context.loop_client.advanced) == ([], 0.0)
 
 
@@ -477,7 +477,7 @@ def test_a_mounting_whose_weight_turns_with_the_wrist_is_said_to_be_verified(
 ):
     carried = payload(0.45)
     context = wrist(tmp_path, carried, weighed(carried))
-    prove_mounting(context)
+    verify_mounting(context)
     said = capsys.readouterr().out
     assert f"{GOOD} mounting verified: 0.0 N off (limit 1.0)" in said
     assert said.index("clear the space") < said.index("mounting verified")
@@ -496,17 +496,17 @@ def test_a_weight_may_be_off_by_the_limit_and_no_more(tmp_path, limit, is_verifi
 
     context = wrist(tmp_path, payload(0.0), seen, residual=limit)
     if is_verified:
-        prove_mounting(context)
+        verify_mounting(context)
         return
     with pytest.raises(PreflightError, match=r"0\.5 N"):
-        prove_mounting(context)
+        verify_mounting(context)
 
 
 def test_a_light_foot_on_a_turned_sensor_is_refused_within_the_limit(tmp_path):
     carried = payload(0.2)
-    prove_mounting(wrist(tmp_path / "a", carried, weighed(carried, 8.0)))
+    verify_mounting(wrist(tmp_path / "a", carried, weighed(carried, 8.0)))
     with pytest.raises(PreflightError, match=r"turned by -?30 degrees"):
-        prove_mounting(wrist(tmp_path / "b", carried, weighed(carried, 30.0), 5.0))
+        verify_mounting(wrist(tmp_path / "b", carried, weighed(carried, 30.0), 5.0))
 
 
 def test_a_real_sensor_of_unknown_bias_is_tared_without_a_residual(tmp_path, capsys):

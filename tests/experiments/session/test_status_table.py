@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.generated_sessions import make_sessions
 from experiments.session import summaries
-from experiments.session.status_table import find_deviations, see_sessions
+from experiments.session.status_table import find_deviations, summarise_sessions
 from experiments.session.store import list_sessions
 from experiments.session.summaries import Checksums
 from experiments.session.where import Where, parse_where
@@ -25,7 +25,7 @@ def recording(data):
 
 def look(data, digest):
     """Return the kept trials by session and the deviations."""
-    seen = see_sessions(data, Where(), digest)
+    seen = summarise_sessions(data, Where(), digest)
     kept = {s.folder.id: s.summary.kept for s in seen}
     return kept, [d.text() for d in find_deviations(seen, Where())]
 
@@ -93,5 +93,5 @@ def test_conditions_hash_no_other_session(data, monkeypatch):
         return usual(folder, digest)
 
     monkeypatch.setattr("experiments.session.status_table.summarise", seen)
-    see_sessions(data, parse_where("session=S002", ()), Checksums())
+    summarise_sessions(data, parse_where("session=S002", ()), Checksums())
     assert summarised == [("S002", True)]

@@ -6,7 +6,7 @@ import pytest
 
 from experiments.session.lock import session_lock
 from experiments.session.store import create_session
-from experiments.session.unbegun import clear_unbegun
+from experiments.session.unbegun import remove_never_started
 
 MINUTE = 60_000_000_000
 NOW = 1_800_000_000_000_000_000
@@ -29,7 +29,7 @@ def age(folder, ns=2 * MINUTE):
 
 def test_a_session_that_never_began_keeps_no_number(tmp_path, unbegun):
     age(unbegun)
-    assert clear_unbegun(tmp_path, NOW) == [unbegun.path.name]
+    assert remove_never_started(tmp_path, NOW) == [unbegun.path.name]
     again = create_session(tmp_path, "S0", is_simulated=True, utc_ns=NOW)
     assert again.id == unbegun.id
 
@@ -41,19 +41,19 @@ def test_a_session_that_never_began_keeps_no_number(tmp_path, unbegun):
 def test_whatever_else_is_there_keeps_it(tmp_path, unbegun, name):
     (unbegun.path / name).write_text("")
     age(unbegun)
-    assert clear_unbegun(tmp_path, NOW) == []
+    assert remove_never_started(tmp_path, NOW) == []
     assert (unbegun.path / name).exists()
 
 
 def test_one_that_begins_now_is_left_alone(tmp_path, unbegun):
     age(unbegun, MINUTE // 2)
-    assert clear_unbegun(tmp_path, NOW) == []
+    assert remove_never_started(tmp_path, NOW) == []
 
 
 def test_one_that_is_open_is_left_alone(tmp_path, unbegun):
     with session_lock(unbegun):
         age(unbegun)
-        assert clear_unbegun(tmp_path, NOW) == []
+        assert remove_never_started(tmp_path, NOW) == []
 
 
 def test_a_link_is_not_followed(tmp_path, unbegun):
@@ -62,5 +62,5 @@ def test_a_link_is_not_followed(tmp_path, unbegun):
     (other / "precious").write_text("")
     (unbegun.path / "trials").rmdir()
     (unbegun.path / "trials").symlink_to(other)
-    assert clear_unbegun(tmp_path, NOW) == []
+    assert remove_never_started(tmp_path, NOW) == []
     assert (other / "precious").exists()

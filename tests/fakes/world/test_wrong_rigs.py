@@ -7,7 +7,7 @@ import pytest
 
 from acquisition.devices import SafetyMode
 from acquisition.errors import SettingsError
-from experiments.rig.fake import typed_wrongly, wrong_rigs
+from experiments.rig.fake import with_typing_error, wrong_rigs
 from experiments.settings.load import load_settings
 from fakes.clock import SteppedClock
 from fakes.ground.terrain import GroundChoice
@@ -270,9 +270,9 @@ def test_wrong_feet_have_the_named_deviation():
 
 def test_a_mistyped_foot_is_wrong_in_the_settings():
     settings = load_settings(None)
-    light = typed_wrongly(settings, "foot-forgotten")
+    light = with_typing_error(settings, "foot-forgotten")
     assert {foot.mass for foot in light.rig.feet.values()} == {0.05}
-    assert typed_wrongly(settings, "foot-heavier") is settings
+    assert with_typing_error(settings, "foot-heavier") is settings
 
 
 def test_wrong_links_and_friction_have_the_named_deviation(build):
