@@ -19,5 +19,8 @@ def parameters(rows: Iterable[Attack]) -> list:
 
 
 def _marks_of(row: Attack) -> list[pytest.MarkDecorator]:
-    clock = [pytest.mark.wall_clock] if row.on_wall_clock else []
-    return [*_MARKS[row.run_by], *clock, pytest.mark.timeout(row.seconds)]
+    timeout = pytest.mark.timeout(row.seconds)
+    if not row.on_wall_clock:
+        return [*_MARKS[row.run_by], timeout]
+    long = [pytest.mark.long] if row.run_by is RunBy.NIGHTLY else []
+    return [pytest.mark.wall_clock, *long, timeout]

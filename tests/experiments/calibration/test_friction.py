@@ -18,7 +18,7 @@ from wam.calibration import excitation
 from wam.model.friction import friction_of
 
 SHARES, SEEDS = (0.2, 0.4, 1.0), (1, 2, 3, 4, 5)
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.long, pytest.mark.timeout(600)]
 
 
 def calibrate(out, *options, press=None, is_quick=True):

@@ -13,7 +13,7 @@ from experiments.commissioning.evidence.record import (
 from experiments.commissioning.procedure import STEPS
 from tests.experiments.program import traction, write_config
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]
+pytestmark = [pytest.mark.long, pytest.mark.timeout(1800)]
 OPTIONS = ("--fake", "--fast", "--operator-script", "auto", "--seed", 1)
 NAMES = ("--operator", "Ada")
 
