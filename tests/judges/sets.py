@@ -154,12 +154,12 @@ def robot_leg(folder: Path) -> Iterator[Judgement]:
     for what, changed, words in (
         ("reversed sign", {"acts": "foot-on-ground"}, ["the other --acts"]),
         ("wrong frame", {"sensor": "shank"}, ["axes of the wrench"]),
-        ("another wrong frame", {"sensor": "base"}, ["other sign", "another frame"]),
+        ("another wrong frame", {"sensor": "base"}, ["opposite sign", "frame"]),
         ("forgotten tare", {"tare": "none"}, ["forgotten tare"]),
         ("tare under load", {"tare": (4.5, 4.9)}, ["at its lowest position"]),
         ("no such frame", {"foot": "sole"}, ["nearest links"]),
         ("wrong lag", {"lag": 0.06}, ["--lag 60 ms; starts and stops show"]),
-        ("forgotten weight", {"mass": 0.0}, ["--tool-mass 0", "weight"]),
+        ("forgotten weight", {"mass": 0.0}, ["--tool-mass 0", "mass"]),
     ):
         yield said(of, what, _refusal(replace(request, **changed)), words)
     for axes, text in _exchanged(folder, request):
