@@ -238,18 +238,9 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "if now == before: -> pass",
     ): "a step of 0 bends no bristle",
     (
-        f"{_CONTROL}/soft_walls.py",
-        "if not low <= angle <= high: -> if not low < angle <= high:",
-    ): _AT_REST,
-    (
         f"{_CONTROL}/position_control.py",
         "elif t <= T - ramp: -> elif t < T - ramp:",
     ): _AT_REST,
-    (
-        f"{_CONTROL}/controller.py",
-        "self._mode = Standing(self.impedance, np.zeros(7)) -> "
-        "self._mode = Standing(self.impedance, np.zeros(8))",
-    ): _UNREAD,
     (
         f"{_DRIVER}/home.py",
         "wrapped = (difference + turn / 2) % turn - turn / 2 -> wrapped = "
