@@ -15,7 +15,7 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from enum import Enum
@@ -141,13 +141,19 @@ def code_digest(root: Path = _ROOT, *, is_drawn: bool = False) -> str:
     if is_drawn:
         packages += ["ft_sensor", "wam"]
         libraries += ["matplotlib", "pillow"]
-    digest = hashlib.sha256(" ".join(map(version, libraries)).encode())
     drawing = root.joinpath(*_FIGURES.split("."))
-    for path in sorted(p for name in packages for p in (root / name).rglob("*.py")):
-        if is_drawn or not path.is_relative_to(drawing):
-            content = path.read_bytes()
-            digest.update(f" {path.relative_to(root)} {len(content)} ".encode())
-            digest.update(content)
+    paths = (path for name in packages for path in (root / name).rglob("*.py"))
+    used = [p for p in paths if is_drawn or not p.is_relative_to(drawing)]
+    return sources_digest(root, used, libraries)
+
+
+def sources_digest(root: Path, paths: Iterable[Path], libraries: Iterable[str]) -> str:
+    """Return the SHA-256 of files below `root` and of versions of libraries."""
+    digest = hashlib.sha256(" ".join(map(version, libraries)).encode())
+    for path in sorted(paths):
+        content = path.read_bytes()
+        digest.update(f" {path.relative_to(root)} {len(content)} ".encode())
+        digest.update(content)
     return digest.hexdigest()
 
 

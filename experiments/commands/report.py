@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from experiments.arguments import (
     add_allow_missing,
@@ -14,9 +14,6 @@ from experiments.arguments import (
     add_scheduler,
     add_seed,
 )
-
-if TYPE_CHECKING:
-    from experiments.report.up_to_date import ReportRecord
 
 EXAMPLES = """\
   traction report S012                             one session, in its own folder
@@ -62,45 +59,6 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _print_up_to_date(record: ReportRecord, args: argparse.Namespace) -> None:
-    """Print the path of the report and its omissions."""
-    from experiments.operator.console import WARNING, Console
-
-    console = Console(color=not args.no_color)
-    console.say("The report is up to date: trials, options and program are the same.")
-    for line in _left_out(record.out):
-        console.say(f"{WARNING} left out: {line}")
-    console.say(f"Open in a browser: {record.page}")
-
-
-def _record(args: argparse.Namespace) -> ReportRecord:
-    """Return the record of the report's present inputs."""
-    from experiments.report.choices import choose_sessions
-    from experiments.report.up_to_date import record_of
-    from experiments.settings.load import load_settings
-
-    data = Path(args.data)
-    sessions = choose_sessions(data, args.sessions, every=args.all)
-    order = [row.name for row in load_settings(args.config).matrix.terrains]
-    own = sessions[0].path if len(sessions) == 1 else data / "study"
-    others = {
-        "config",
-        "data",
-        "json",
-        "no_color",
-        "run",
-    }  # compared by content instead
-    options = {name: value for name, value in vars(args).items() if name not in others}
-    return record_of(sessions, args.to or data, args.to or own, (options, order))
-
-
-def _left_out(out: Path) -> list[str]:
-    """Return the recordings omitted from a report, with reasons."""
-    import json
-
-    return json.loads((out / "fits.json").read_bytes())["left_out"]
-
-
 def _report(args: argparse.Namespace) -> None:
     from analysis.tables.columns import parse_covariates
     from experiments.operator.console import Console, PageRecorder
@@ -112,37 +70,45 @@ def _report(args: argparse.Namespace) -> None:
     )
     from experiments.report.covariates import KNOWN
     from experiments.report.sessions import report_sessions
+    from experiments.report.up_to_date import record_of
     from experiments.settings.load import load_settings
 
     choices = analysis_choices(args)
-    record = _record(args)  # before the data are read
-    if not args.json and record.is_current():
-        _print_up_to_date(record, args)
-        return
     console = PageRecorder() if args.json else Console(color=not args.no_color)
     data = Path(args.data)
     sessions = choose_sessions(data, args.sessions, every=args.all)
-    order = [row.name for row in load_settings(args.config).matrix.terrains]
-    missing = report_missing(sessions, console, allow_missing=args.allow_missing)
     wanted = ReportRequest(
         args.seed,
-        order,
+        [row.name for row in load_settings(args.config).matrix.terrains],
         args.scheduler,
         choices,
-        missing,
         covariates=()
         if args.covariate is None
         else parse_covariates(args.covariate, KNOWN),
         out=args.to,
         with_pdf=args.pdf,
     )
-    page = report_sessions(sessions, data, wanted, console)
-    record.write()
+    record = record_of(sessions, data, wanted)  # before the data are read
+    if not args.json and record.is_current():
+        console.say("The report is up to date: its data and options are the same.")
+        console.say(f"Open in a browser: {record.page}")
+        return
+    missing = report_missing(sessions, console, allow_missing=args.allow_missing)
+    page = report_sessions(sessions, data, replace(wanted, missing=missing), console)
+    if not missing and not _left_out(page):  # what is incomplete is said every time
+        record.write()
     if args.json:
         names = [session.id for session in sessions]
         Console(color=False).say(_as_json(page, names, missing))
     else:
         console.say(f"Open in a browser: {page}")
+
+
+def _left_out(page: Path) -> list[str]:
+    """Return the recordings omitted from a report, with reasons."""
+    import json
+
+    return json.loads((page.parent.parent / "fits.json").read_bytes())["left_out"]
 
 
 def _is_kept(data: Path, to: Path | None) -> bool:

@@ -147,6 +147,14 @@ def repeat_study(
     return others
 
 
+def folder_of(
+    sessions: Sequence[SessionFolder], data: Path, request: ReportRequest
+) -> Path:
+    """Return the folder of a report: a session's own, or that of the study."""
+    own = sessions[0].path if len(sessions) == 1 else data / "study"
+    return request.out or own
+
+
 def choose_sessions(
     data: Path, names: Sequence[str], *, every: bool
 ) -> list[SessionFolder]:

@@ -15,7 +15,7 @@ from analysis.study.models import FitOptions
 from analysis.study.store import MOST_BYTES, ResultStore
 from analysis.study.study import Study, StudyOptions, run_study
 from experiments.operator.console import Console
-from experiments.report.choices import ReportRequest
+from experiments.report.choices import ReportRequest, folder_of
 from experiments.report.commissioned import uncommissioned
 from experiments.report.covariates import recorded_columns
 from experiments.report.duplicates import TrialDigests
@@ -159,8 +159,7 @@ def report_sessions(
         SettingsError: the folder cannot be written.
         MissingLibraryError: the extra `report` is not installed.
     """
-    own = sessions[0].path if len(sessions) == 1 else data / "study"
-    out = request.out or own
+    out = folder_of(sessions, data, request)
     require_folder(out)
     kept = request.out or data  # folder of the results, for the next report
     analysed = study_sessions(sessions, kept, request, console, request.fit)

@@ -6,17 +6,18 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 
+from acquisition.errors import SettingsError
 from acquisition.files import read_regular
-from analysis.study.store import write_atomic
+from analysis.study.store import sources_digest, write_atomic
+from experiments.report.choices import ReportRequest, folder_of
 from experiments.session.store import FOLDS, SessionFolder
 
 _ROOT = Path(__file__).parents[2]
 _PACKAGES = ("acquisition", "analysis", "experiments", "ft_sensor", "wam")
 _LIBRARIES = ("numpy", "scipy", "matplotlib", "pillow", "jinja2")
-_OUTPUTS = ("fits.json", "fits.csv", "report/index.html")
+_PAGE = "report/index.html"
 _LARGEST = 1 << 20  # bytes of a record
 
 
@@ -37,7 +38,7 @@ class ReportRecord:
     @property
     def page(self) -> Path:
         """The page of the report."""
-        return self.out / _OUTPUTS[-1]
+        return self.out / _PAGE
 
     def is_current(self) -> bool:
         """Whether the report has the same inputs and unchanged files.
@@ -52,32 +53,29 @@ class ReportRecord:
 
     def write(self) -> None:
         """Write the record of a new report, if possible."""
-        with suppress(OSError, ValueError):
+        with suppress(SettingsError):
             write_atomic(self.path, json.dumps(self._content()).encode())
 
     def _content(self) -> dict[str, object]:
-        outputs = [_stamp(self.out / name) for name in _OUTPUTS]
+        figures = sorted((self.out / "figures").glob("*"))
+        files = [self.page, *(self.out / f"fits.{end}" for end in ("json", "csv"))]
+        outputs = [[str(path), *_stamp(path)] for path in (*files, *figures)]
         return {"inputs": self.inputs, "outputs": outputs}
 
 
 def record_of(
-    sessions: Sequence[SessionFolder], kept: Path, out: Path, options: object
+    sessions: Sequence[SessionFolder], data: Path, request: ReportRequest
 ) -> ReportRecord:
-    """Return the record of a report of `sessions` in their present state.
-
-    Args:
-        sessions: the reported sessions.
-        kept: folder of the stored results.
-        out: folder of the report.
-        options: all other inputs of the report, compared as text.
-    """
-    digest = hashlib.sha256(f"{_program()} {options!r}".encode())
+    """Return the record of a report of `sessions` as they are now."""
+    digest = hashlib.sha256(f"{_program()} {request!r}".encode())
     for session in sessions:
         digest.update(f"\n{session.path.resolve()}".encode())
         for path in _recorded_files(session.path):
             digest.update(f"\n{path} {_stamp(path)}".encode())
+    out = folder_of(sessions, data, request)
     name = hashlib.sha256(str(out.resolve()).encode()).hexdigest()
-    return ReportRecord(out, kept / FOLDS / f"report-{name}.json", digest.hexdigest())
+    path = (request.out or data) / FOLDS / f"report-{name}.json"
+    return ReportRecord(out, path, digest.hexdigest())
 
 
 def _recorded_files(folder: Path) -> Iterable[Path]:
@@ -101,11 +99,7 @@ def _stamp(path: Path) -> list[int]:
 
 @cache
 def _program() -> str:
-    """Return the digest of all sources, data files and libraries of the program."""
-    digest = hashlib.sha256(" ".join(map(version, _LIBRARIES)).encode())
-    for package in _PACKAGES:
-        for path in sorted((_ROOT / package).rglob("*")):
-            if path.is_file() and path.suffix not in {".pyc", ".so"}:
-                digest.update(f"{path.relative_to(_ROOT)} ".encode())
-                digest.update(path.read_bytes())
-    return digest.hexdigest()
+    """Return the digest of the program's sources and data files, and of libraries."""
+    every = (p for name in _PACKAGES for p in (_ROOT / name).rglob("*"))
+    files = [p for p in every if p.is_file() and p.suffix != ".pyc"]
+    return sources_digest(_ROOT, files, _LIBRARIES)

@@ -1,6 +1,7 @@
 """A report that is made a second time computes nothing anew."""
 
 import json
+import os
 import shutil
 from functools import wraps
 
@@ -100,7 +101,9 @@ def test_a_report_of_unchanged_data_says_so_and_reads_no_trial(copied, monkeypat
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("change", ["sidecar", "option", "page", "program", "trial"])
+@pytest.mark.parametrize(
+    "change", ["sidecar", "option", "page", "figure", "program", "trial"]
+)
 def test_a_report_is_made_again_if_anything_has_changed(copied, change, monkeypatch):
     options = ()
     session = only_session(copied)
@@ -112,8 +115,29 @@ def test_a_report_is_made_again_if_anything_has_changed(copied, change, monkeypa
         (session / "report" / "index.html").unlink()
     elif change == "program":
         monkeypatch.setattr("experiments.report.up_to_date._program", lambda: "other")
+    elif change == "figure":
+        next((session / "figures").glob("*.png")).unlink()
     else:
-        (session / "trials" / "T02.mcap").rename(session / "trials" / "T09.mcap")
-        options = ("--allow-missing",)
+        path = session / "trials" / "T02.mcap"
+        os.utime(path, ns=(0, 0))
     assert not is_up_to_date(copied, *options)
     assert is_up_to_date(copied, *options)
+
+
+@pytest.mark.slow
+def test_an_incomplete_report_says_so_every_time(copied):
+    session = only_session(copied)
+    (session / "trials" / "T02.mcap").rename(session / "trials" / "T09.mcap")
+    for _ in range(2):
+        assert not is_up_to_date(copied, "--allow-missing")
+    assert traction("report", "S001", "--data", copied).code == 6
+
+
+@pytest.mark.slow
+def test_a_record_that_cannot_be_written_costs_nothing(copied):
+    records = (copied / ".folds").glob("report-*.json")
+    record = max(records, key=lambda path: path.stat().st_mtime_ns)
+    record.unlink()
+    record.mkdir()
+    assert not is_up_to_date(copied)
+    assert not is_up_to_date(copied)
