@@ -93,6 +93,9 @@ class Soak:
         simulated_ns: how much time has passed in all simulations.
         counts: sessions, trials, resumes, faults by name.
         base: descriptors and memory after the first sessions.
+        data: the folder of the present session.
+        children: processes of this one before the first session; a worker of pytest
+            keeps those that earlier tests started.
     """
 
     folder: Path
@@ -102,6 +105,7 @@ class Soak:
     counts: Counter = field(default_factory=Counter)
     base: tuple[int, int] | None = None
     data: Path = Path()
+    children: frozenset[str] = field(default_factory=lambda: child_processes())
 
     def check_files(self) -> None:
         """Hold journal, session.json and verified files against each other."""
@@ -123,7 +127,8 @@ class Soak:
         rig = self.built.rig
         is_braked = rig.plant.is_idle or rig.network.safety_mode is SafetyMode.E_STOP
         assert is_braked, (rig.network.safety_mode, done.err)
-        assert not children(), children()
+        left = child_processes() - self.children
+        assert not left, left
 
     def check_growth(self) -> None:
         """Hold descriptors, shared memory and memory against the beginning."""
@@ -149,10 +154,10 @@ def resident_kb() -> int:
     return pages * resource.getpagesize() // 1024
 
 
-def children() -> list[str]:
-    """Return the processes that this one has started and that still run."""
+def child_processes() -> frozenset[str]:
+    """Process ids of the running children of this process."""
     task = Path(f"/proc/self/task/{os.getpid()}/children")
-    return task.read_text().split() if task.exists() else []
+    return frozenset(task.read_text().split() if task.exists() else [])
 
 
 def _pattern(what: str) -> str:
