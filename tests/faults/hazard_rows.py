@@ -507,7 +507,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "no effect on the arm",
             (
-                "tests/experiments/session/test_random_kills.py::test_eight_kills_are_survived_and_no_kept_trial_is_lost",
+                "tests/experiments/session/test_random_kills.py::test_a_few_random_kills_lose_no_kept_trial",
             ),
         ),
     },

@@ -1,4 +1,4 @@
-"""Notes, verdicts, tables and pictures of a session that is over."""
+"""Verdicts, notes, replay and status of an ended session; init and settings."""
 
 import json
 import shutil
@@ -34,7 +34,7 @@ class Copy:
 
 @pytest.fixture
 def copied(tmp_path, recorded):
-    """Return a copy of the session of two trials, to be changed."""
+    """A copy of the session of two trials that tests may change."""
     shutil.copytree(recorded.data, tmp_path / "data")
     return Copy(tmp_path / "data", only_session(tmp_path / "data"))
 
@@ -62,7 +62,7 @@ def test_a_rejected_trial_moves_with_reason_author_and_history(copied):
     assert replay(journal(copied.folder)).phase == "unfinished"
 
 
-def test_a_trial_that_is_kept_again_is_the_same_file_with_a_longer_history(copied):
+def test_a_trial_kept_again_is_the_same_file_with_a_longer_history(copied):
     before = digest(copied.folder / "trials" / "T01.mcap")
     copied.say("verdict", "S001", "T01", "reject", "why")
     done = copied.say("verdict", "S001", "T01a", "keep", "it was fine")
@@ -94,18 +94,18 @@ def test_a_trial_whose_file_has_changed_is_not_kept(copied):
         ("../T01", "'../T01' is not a trial."),
     ],
 )
-def test_a_verdict_on_no_trial_is_refused(copied, trial, text):
+def test_a_verdict_on_an_unknown_trial_is_refused(copied, trial, text):
     done = copied.say("verdict", "S001", trial, "reject", "why")
     assert (done.code, done.err[: len(text)]) == (2, text)
     assert kept_and_sound(copied.folder) == ["T01", "T02"]
 
 
 @pytest.mark.parametrize(
-    ("text", "found"),
+    ("text", "parsed"),
     [("T04", (4, 0)), ("4", (4, 0)), ("T04b", (4, 2)), ("T04aa", (4, 27))],
 )
-def test_trials_are_named_as_their_files_are(text, found):
-    assert parse_trial(text) == found
+def test_trial_names_are_parsed_into_number_and_attempt(text, parsed):
+    assert parse_trial(text) == parsed
 
 
 # --- note -----------------------------------------------------------------------------
@@ -121,7 +121,7 @@ def test_a_note_on_a_session_goes_into_its_journal(copied):
     assert replay(journal(copied.folder)).phase == "complete"
 
 
-def test_a_note_on_a_trial_stands_beside_it_too(copied):
+def test_a_note_on_a_trial_goes_into_its_sidecar_without_control_characters(copied):
     done = copied.say("note", "S001", "T02", "a stone\n was \x1b[31mwedged")
     assert done.out == "Noted on S001 T02.\n"
     (note,) = sidecar(copied.folder / "trials" / "T02.mcap")["notes"]
@@ -130,7 +130,7 @@ def test_a_note_on_a_trial_stands_beside_it_too(copied):
 
 
 @pytest.mark.parametrize("text", ["", "  ", "x" * 2001])
-def test_a_note_without_a_usable_text_is_refused(copied, text):
+def test_an_empty_or_overlong_note_is_refused(copied, text):
     done = copied.say("note", "S001", text)
     assert done.code == 2
     assert "characters, expected 1 to 2000" in done.err
@@ -159,13 +159,13 @@ def test_init_overwrites_nothing(tmp_path):
 
 
 def line_in(path, setting, key):
-    """Return how a setting is printed that is given where `path` has `key` first."""
+    """Printed line of a setting whose line in `path` begins with `key`."""
     lines = enumerate(path.read_text().splitlines(), 1)
     number = next(number for number, line in lines if line.startswith(key))
     return f"   {setting}   ({path}, line {number})"
 
 
-def test_every_setting_is_printed_with_where_it_comes_from(config):
+def test_settings_are_printed_with_their_source(config):
     lines = traction("check", "--config-only", "--config", config).out.splitlines()
     beside = config.with_name("matrix.toml")
     assert line_in(config, 'can.channel = "can0"', "channel = ") in lines
@@ -181,8 +181,8 @@ def test_every_setting_is_printed_with_where_it_comes_from(config):
 # --- replay ---------------------------------------------------------------------------
 
 
-class Jumping(SystemClock):
-    """A clock that waits by moving on."""
+class JumpingClock(SystemClock):
+    """Clock that waits by advancing."""
 
     def __init__(self):
         super().__init__()
@@ -195,8 +195,8 @@ class Jumping(SystemClock):
         self.now = max(self.now, t_ns)
 
 
-def test_a_trial_is_shown_again_at_the_speed_asked_for(recorded, monkeypatch):
-    clock = Jumping()
+def test_a_trial_is_replayed_at_the_requested_speed(recorded, monkeypatch):
+    clock = JumpingClock()
     monkeypatch.setattr("acquisition.clock.SystemClock", lambda: clock)
     options = ("--speed", "2", "--data", recorded.data)
     done = traction("replay", "S001", "T01", *options)
@@ -217,7 +217,7 @@ def test_a_trial_is_shown_again_at_the_speed_asked_for(recorded, monkeypatch):
         (("S001", "T01a"), "There is no T01a in S001. Trials: T01 T02."),
     ],
 )
-def test_a_replay_of_nothing_is_refused(recorded, arguments, text):
+def test_a_replay_without_an_existing_trial_is_refused(recorded, arguments, text):
     done = traction("replay", *arguments, "--data", recorded.data)
     assert (done.code, done.err[: len(text)]) == (2, text)
 
@@ -225,7 +225,7 @@ def test_a_replay_of_nothing_is_refused(recorded, arguments, text):
 # --- status ---------------------------------------------------------------------------
 
 
-def test_the_board_shows_which_trials_are_kept(recorded, config):
+def test_status_shows_which_trials_are_kept(recorded, config):
     options = ("--data", recorded.data, "--config", config)
     done = traction("status", "--json", "--where", "kind=simulated", *options)
     (line,) = json.loads(done.out)
@@ -245,21 +245,21 @@ def test_the_board_shows_which_trials_are_kept(recorded, config):
         ("terrain=TF,stones=big", []),
     ],
 )
-def test_the_board_can_be_narrowed(recorded, config, where, names):
+def test_status_can_be_filtered(recorded, config, where, names):
     options = ("--data", recorded.data, "--config", config)
     done = traction("status", "--json", "--where", where, *options)
     assert [line["terrain"] for line in json.loads(done.out)] == names
 
 
 @pytest.mark.parametrize("where", ["colour=red", "kind", "kind="])
-def test_a_condition_that_is_none_is_refused(where):
+def test_an_invalid_where_condition_is_refused(where):
     done = traction("status", "--where", where)
     assert done.code == 2
     assert "expected KEY=VALUE, e.g. kind=live" in done.err
 
 
-def test_the_board_is_followed_until_ctrl_c(recorded, config, monkeypatch):
-    class Looked(Jumping):
+def test_status_follow_ends_at_ctrl_c(recorded, config, monkeypatch):
+    class InterruptedClock(JumpingClock):
         looks = 0
 
         def sleep_until(self, t_ns):
@@ -267,7 +267,7 @@ def test_the_board_is_followed_until_ctrl_c(recorded, config, monkeypatch):
             if self.looks == 3:
                 raise KeyboardInterrupt
 
-    monkeypatch.setattr("acquisition.clock.SystemClock", Looked)
+    monkeypatch.setattr("acquisition.clock.SystemClock", InterruptedClock)
     options = ("--data", recorded.data, "--config", config)
     done = traction("status", "--follow", *options)
     assert done.code == 0

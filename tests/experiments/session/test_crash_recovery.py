@@ -1,4 +1,4 @@
-"""A kill at every step of a verdict, and whether files and journal agree again."""
+"""Files and journal agree again after a kill at any step of a verdict or a recovery."""
 
 import json
 import os
@@ -21,7 +21,7 @@ from fakes.clock import SteppedClock
 from tests.acquisition.trials import make_cycles, write_trial
 
 STEPS = ("hardlink_to", "unlink", "replace")
-MOST = 60  # steps on the disk that anything here takes
+MAX_STEPS = 60  # more changes of the disk than a verdict or a recovery makes
 
 
 class KilledError(BaseException):
@@ -30,7 +30,7 @@ class KilledError(BaseException):
 
 @pytest.fixture(autouse=True)
 def no_disk(monkeypatch):
-    """Do not wait for the disk: nothing here cuts the power."""
+    """Skip fsync: no test here cuts the power."""
     monkeypatch.setattr(os, "fsync", lambda _: None)
 
 
@@ -41,9 +41,9 @@ class Now:
 
 @contextmanager
 def killed_at(step, monkeypatch):
-    """Let the process end before its `step`-th change of the disk.
+    """Kill the process before its `step`-th change of the disk.
 
-    Gives a list that is empty when there were fewer steps.
+    Yields a list that stays empty if there were fewer steps.
     """
     left, was_killed = [step], []
 
@@ -67,7 +67,7 @@ def killed_at(step, monkeypatch):
 
 
 def make_session(data):
-    """Return the book of an ended session: T01 and T02 kept, T01 rejected once."""
+    """Journal of an ended session: T01 and T02 kept, T01 rejected once."""
     folder = create_session(data, "S0", is_simulated=True, utc_ns=Now().utc_ns())
     book = Journal(folder, Now())
     book.append(Event.STARTED, terrain="S0", trials=2)
@@ -91,16 +91,16 @@ def record(book, number, attempt, verdict):
 
 
 def contents(folder):
-    """Return {content: place} of every file of a trial."""
+    """{content: location} of every recording and truth file."""
     paths = [*folder.trials.iterdir(), *folder.rejected.iterdir()]
     files = [p for p in paths if p.suffix != ".json"]
-    found = {p.read_text(): f"{p.parent.name}/{p.name}" for p in files}
-    assert len(found) == len(files), "a file is there twice"
-    return found
+    locations = {p.read_text(): f"{p.parent.name}/{p.name}" for p in files}
+    assert len(locations) == len(files), "a file is there twice"
+    return locations
 
 
 def check_agreement(folder):
-    """Hold the files against the journal."""
+    """Check the files against the journal."""
     book = open_journal(folder, Now())
     kept = [path.stem for path in folder.kept_trials()]
     assert kept == sorted(f"T{number:02d}" for number in book.state.kept)
@@ -114,7 +114,7 @@ def check_agreement(folder):
 
 
 def kill_in_verdict(data, monkeypatch, step, verdict):
-    """Kill a process that gives a verdict on T01, settle; return if it was killed."""
+    """Kill a process during a verdict on T01 and recover; False if not killed."""
     book = make_session(data)
     before = set(contents(book.folder))
     fields = {"trial": 1, "verdict": "reject", "attempt": 2, "reason": "", "who": "mk"}
@@ -131,14 +131,14 @@ def kill_in_verdict(data, monkeypatch, step, verdict):
 
 @pytest.mark.parametrize("verdict", ["reject", "keep"])
 def test_a_kill_at_any_step_of_a_verdict_loses_nothing(tmp_path, monkeypatch, verdict):
-    steps = range(1, MOST)
+    steps = range(1, MAX_STEPS)
     killed = takewhile(
         lambda n: kill_in_verdict(tmp_path / str(n), monkeypatch, n, verdict), steps
     )
-    assert 5 < len(list(killed)) < MOST - 1  # all of them were tried
+    assert 5 < len(list(killed)) < MAX_STEPS - 1  # every step was tried
 
 
-def test_settling_what_is_in_order_changes_nothing(tmp_path):
+def test_recovery_of_an_intact_session_changes_nothing(tmp_path):
     folder = make_session(tmp_path).folder
     texts = {p: p.read_bytes() for p in folder.path.rglob("*") if p.is_file()}
     assert recover_session(open_journal(folder, Now())) == ""
@@ -146,7 +146,7 @@ def test_settling_what_is_in_order_changes_nothing(tmp_path):
 
 
 def crash(data):
-    """Return the book of a session that was killed in T01."""
+    """Journal of a session killed in T01."""
     folder = create_session(data, "S0", is_simulated=True, utc_ns=Now().utc_ns())
     book = Journal(folder, Now())
     book.append(Event.STARTED, terrain="S0", trials=2)
@@ -156,7 +156,7 @@ def crash(data):
 
 
 def leave_partial(book):
-    """Leave a `.partial` of 0.4 s as a kill does."""
+    """Leave a `.partial` of 0.4 s, as after a kill."""
     writer = write_trial(book.folder.trials / "T01.mcap", make_cycles(201), block=67)
     writer.close_partial()
     return writer.partial
@@ -167,7 +167,7 @@ def crashed(tmp_path):
     return crash(tmp_path)
 
 
-def test_a_running_trial_is_recovered_rejected_and_its_source_kept(crashed):
+def test_a_running_trial_is_recovered_and_rejected_and_its_partial_kept(crashed):
     source = sha256_of(leave_partial(crashed))
     assert (
         recover_session(crashed)
@@ -181,7 +181,7 @@ def test_a_running_trial_is_recovered_rejected_and_its_source_kept(crashed):
     assert (crashed.state.phase, crashed.state.running) == (SessionPhase.CRASHED, None)
 
 
-def test_a_sealed_trial_without_a_verdict_is_put_away_whole(crashed):
+def test_a_finished_trial_without_a_verdict_is_rejected_unchanged(crashed):
     path = crashed.folder.trials / "T01.mcap"
     path.write_bytes(b"1.1")
     recording = {"sha256": sha256_of(path), "displacement": 0.4}
@@ -194,7 +194,7 @@ def test_a_sealed_trial_without_a_verdict_is_put_away_whole(crashed):
 
 
 @pytest.mark.parametrize("content", [None, b"", b"nothing that can be saved"])
-def test_a_trial_of_which_nothing_is_left_is_a_rejected_attempt_too(crashed, content):
+def test_a_trial_without_recoverable_data_is_still_a_rejected_attempt(crashed, content):
     if content is not None:
         (crashed.folder.trials / "T01.mcap.partial").write_bytes(content)
     recover_session(crashed)
@@ -203,8 +203,8 @@ def test_a_trial_of_which_nothing_is_left_is_a_rejected_attempt_too(crashed, con
     assert crashed.state.rejected == 1
 
 
-def kill_in_settling(data, monkeypatch, step):
-    """Kill a process that settles a crash, settle; return if it was killed."""
+def kill_in_recovery(data, monkeypatch, step):
+    """Kill a process during a recovery and recover; False if not killed."""
     crashed = crash(data)
     leave_partial(crashed)
     with killed_at(step, monkeypatch) as was_killed:
@@ -220,15 +220,15 @@ def kill_in_settling(data, monkeypatch, step):
     return bool(was_killed)
 
 
-def test_a_kill_at_any_step_of_settling_a_crash_loses_nothing(tmp_path, monkeypatch):
-    steps = range(1, MOST)
+def test_a_kill_at_any_step_of_a_recovery_loses_nothing(tmp_path, monkeypatch):
+    steps = range(1, MAX_STEPS)
     killed = takewhile(
-        lambda n: kill_in_settling(tmp_path / str(n), monkeypatch, n), steps
+        lambda n: kill_in_recovery(tmp_path / str(n), monkeypatch, n), steps
     )
-    assert 5 < len(list(killed)) < MOST - 1  # all of them were tried
+    assert 5 < len(list(killed)) < MAX_STEPS - 1  # every step was tried
 
 
-def test_a_torn_line_is_ended_before_the_next_one(crashed):
+def test_a_torn_journal_line_is_ended_before_the_next_event(crashed):
     path = crashed.folder.path / "events.jsonl"
     with path.open("ab") as file:
         file.write(b'{"event": "trial-rec')
@@ -240,7 +240,7 @@ def test_a_torn_line_is_ended_before_the_next_one(crashed):
     assert open_journal(crashed.folder, Now()).state == book.state
 
 
-def test_a_recorder_that_still_writes_is_waited_for(crashed, monkeypatch):
+def test_recovery_waits_for_a_recorder_that_still_writes(crashed, monkeypatch):
     looks = [True, True, False]
     monkeypatch.setattr(crash_recovery, "is_claimed", lambda _: looks.pop(0))
     recover_session(crashed)
@@ -248,7 +248,7 @@ def test_a_recorder_that_still_writes_is_waited_for(crashed, monkeypatch):
     assert crashed.state.running is None
 
 
-def test_what_a_killed_process_left_in_a_session_is_swept(crashed):
+def test_recovery_removes_only_temporary_files_of_a_killed_process(crashed):
     folder = crashed.folder
     gone = 2**22 + 1  # no process has this number
     left = folder.trials / f"{ROOM}-{gone}-abcdefgh"
@@ -262,9 +262,7 @@ def test_what_a_killed_process_left_in_a_session_is_swept(crashed):
 
 
 @pytest.mark.parametrize("damaged", [b"{", b"", b"[]", None])
-def test_a_recording_whose_sidecar_is_damaged_is_put_aside_all_the_same(
-    tmp_path, damaged
-):
+def test_a_recording_with_a_damaged_sidecar_is_still_set_aside(tmp_path, damaged):
     book = make_session(tmp_path)
     folder = book.folder
     sidecar = folder.trials / "T02.json"
@@ -289,7 +287,7 @@ def test_a_damaged_sidecar_does_not_move_the_recording_of_another_attempt(tmp_pa
     assert not (folder.rejected / "T01a.mcap").exists()
 
 
-def test_a_recorder_that_never_ends_is_waited_for_twenty_seconds(crashed, monkeypatch):
+def test_recovery_gives_up_on_a_recorder_that_never_ends(crashed, monkeypatch):
     clock = SteppedClock()
     began_ns, asked_ns = clock.now_ns(), []
 

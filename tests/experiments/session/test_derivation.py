@@ -1,4 +1,4 @@
-"""Sidecars, places and session.json follow from the journal, whatever they were.
+"""Sidecars, file locations and session.json are derived from the journal.
 
 The session has a rejected and a kept attempt at T01, notes, verdicts that are changed
 later, and a redo of T02.
@@ -38,16 +38,16 @@ class Now:
 
 @pytest.fixture(autouse=True)
 def no_disk(monkeypatch):
-    """Do not wait for the disk: nothing here cuts the power."""
+    """Skip fsync: no test here cuts the power."""
     monkeypatch.setattr(os, "fsync", lambda _: None)
 
 
 @dataclass
 class Story:
-    """Writes a session, and what its files were after each event.
+    """Writes a session and records its derived files after each event.
 
     Attributes:
-        journal: of the session.
+        journal: journal of the session.
         after: derived files by the number of events.
     """
 
@@ -69,8 +69,7 @@ class Story:
     def tare(self, t_ns):
         self.append(Event.TARED, t_ns=t_ns, bias=[0.1 * t_ns] * 6, spread=0.1)
 
-    def tell(self):
-        """Write the whole session."""
+    def write_session(self):
         self.append(Event.STARTED, terrain="TF", trials=2, operator="mk")
         self.append(Event.ACTIVATED)
         self.tare(1)
@@ -94,7 +93,7 @@ class Story:
 
 
 def write_recording(folder, name):
-    """Write a trial file and the truth beside it; return the numbers of the first."""
+    """Write a trial file and its truth; the recording's fields for the journal."""
     path = folder.trials / f"{name.kept}.mcap"
     cycles = make_cycles(CYCLES, seed=10 * name.number + name.attempt)
     writer = write_trial(path, cycles, block=CYCLES)
@@ -107,9 +106,9 @@ def write_recording(folder, name):
 
 
 def derived_files(folder):
-    """Return places and contents of all that follows from the journal.
+    """Locations and contents of all files derived from the journal.
 
-    The files of a trial that is being recorded do not yet.
+    Files of a trial that is being recorded are left out.
     """
     running = {a.name.kept for a in replay(folder.events()).attempts if is_new(a)}
     paths = [*folder.trials.glob("T*"), *folder.rejected.glob("T*")]
@@ -126,27 +125,27 @@ def is_new(attempt):
 
 
 @pytest.fixture(scope="module")
-def told(tmp_path_factory):
-    """Return the story, and the operations on the disk that it took."""
-    root = tmp_path_factory.mktemp("told")
+def written_story(tmp_path_factory):
+    """The story and the disk operations that wrote it."""
+    root = tmp_path_factory.mktemp("written_story")
     with recorded(root) as recording:
         utc_ns = Now().utc_ns()
         folder = create_session(root, "TF", is_simulated=True, utc_ns=utc_ns)
         story = Story(Journal(folder, Now()), after={})
-        story.tell()
+        story.write_session()
     return story, recording
 
 
 @pytest.fixture
-def folder(told, tmp_path):
-    """Return a copy of the session that may be spoiled."""
-    source = told[0].journal.folder.path
+def folder(written_story, tmp_path):
+    """A copy of the session that tests may damage."""
+    source = written_story[0].journal.folder.path
     shutil.copytree(source, tmp_path / "sessions" / source.name)
     return list_sessions(tmp_path)[0]
 
 
-def lose_what_is_derived(folder: SessionFolder):
-    """Delete session.json and sidecars, and give the recordings other places."""
+def lose_derived_files(folder: SessionFolder):
+    """Delete session.json and sidecars, and misplace the recordings."""
     for path in [*folder.path.rglob("T*.json"), folder.path / "session.json"]:
         path.unlink(missing_ok=True)
     state = replay(folder.events())
@@ -166,7 +165,7 @@ def move(folder, place, other):
             path.rename(folder.path / f"{other}{suffix}")
 
 
-def test_what_is_lost_or_misplaced_is_derived_again(told, folder):
+def test_lost_or_misplaced_files_are_derived_again(written_story, folder):
     before = derived_files(folder)
     assert sorted(before) == [
         *("rejected/T01b.json", "rejected/T01b.mcap", "rejected/T01b.truth.mcap"),
@@ -175,14 +174,14 @@ def test_what_is_lost_or_misplaced_is_derived_again(told, folder):
         *("trials/T01.json", "trials/T01.mcap", "trials/T01.truth.mcap"),
         *("trials/T02.json", "trials/T02.mcap", "trials/T02.truth.mcap"),
     ]
-    lose_what_is_derived(folder)
+    lose_derived_files(folder)
     assert derived_files(folder).keys() != before.keys()
     derive(folder, replay(folder.events()))
     assert derived_files(folder) == before
-    assert told[0].journal.state == replay(folder.events())
+    assert written_story[0].journal.state == replay(folder.events())
 
 
-def test_a_sidecar_has_all_that_the_journal_brought(folder):
+def test_a_sidecar_holds_verdict_notes_tare_and_review_of_the_journal(folder):
     first = read_json(folder.trials / "T01.json")
     assert (first["verdict"], first["reason"], first["who"]) == (
         *("keep", "seen again", "km"),
@@ -194,7 +193,7 @@ def test_a_sidecar_has_all_that_the_journal_brought(folder):
     assert "next_tare" not in read_json(folder.rejected / "T02a.json")
 
 
-def test_what_is_in_line_is_not_written_again(folder):
+def test_consistent_files_are_not_rewritten(folder):
     before = {p: p.stat().st_ino for p in folder.path.rglob("*")}
     derive(folder, replay(folder.events()))
     assert {p: p.stat().st_ino for p in folder.path.rglob("*")} == before
@@ -211,7 +210,7 @@ def test_a_damaged_sidecar_is_replaced_and_moves_no_recording(folder, damaged):
     assert derived_files(folder) == before
 
 
-def test_a_copy_of_a_session_that_has_a_recording_in_both_places_is_in_line(folder):
+def test_a_duplicate_recording_is_removed_and_an_unknown_one_left_alone(folder):
     before = derived_files(folder)
     shutil.copy(folder.trials / "T01.mcap", folder.rejected / "T01a.mcap")
     shutil.copy(folder.rejected / "T02a.mcap", folder.rejected / "T02c.mcap")
@@ -220,14 +219,14 @@ def test_a_copy_of_a_session_that_has_a_recording_in_both_places_is_in_line(fold
     assert derived_files(folder) == before
 
 
-def test_nothing_is_derived_from_a_journal_that_is_lost(folder):
+def test_nothing_is_derived_from_a_lost_journal(folder):
     before = derived_files(folder)
     (folder.path / "events.jsonl").unlink()
     recover_session(open_journal(folder, Now()))
     assert derived_files(folder) == before
 
 
-def test_readers_count_what_the_journal_says_and_write_nothing(folder):
+def test_readers_follow_the_journal_and_write_nothing(folder):
     state = replay(folder.events())
     wanted = [sidecar_of(folder, attempt) for attempt in state.attempts]
     sums = [sha256_of(path) for path in folder.kept_trials()]
@@ -249,7 +248,7 @@ def test_readers_count_what_the_journal_says_and_write_nothing(folder):
 
 
 def kills(operations):
-    """Return what is on the disk after each operation that changes it."""
+    """State of the disk after each operation that changes it."""
     for count, operation in enumerate(operations, 1):
         disk = everything(operations[:count])
         is_made = {path.name for path in disk.folders()} >= NEEDED
@@ -258,10 +257,10 @@ def kills(operations):
 
 
 @pytest.mark.timeout(120)
-def test_after_a_kill_at_any_write_readers_count_and_files_are_those_of_the_last_event(
-    told, tmp_path
+def test_a_kill_at_any_write_leaves_the_files_of_the_last_event(
+    written_story, tmp_path
 ):
-    story, recording = told
+    story, recording = written_story
     seen = set()
     for number, disk in enumerate(kills(recording.operations)):
         disk.write(tmp_path / str(number))
@@ -277,7 +276,7 @@ def test_after_a_kill_at_any_write_readers_count_and_files_are_those_of_the_last
 
 
 def resume(folder):
-    """Put a killed session in order, and record what is missing."""
+    """Recover a killed session and record the missing trials."""
     recover_session(open_journal(folder, Now()))
     story = Story(open_journal(folder, Now()))
     state = story.journal.state
@@ -296,8 +295,10 @@ def resume(folder):
 
 @pytest.mark.slow  # hundreds of sessions resumed
 @pytest.mark.timeout(300)
-def test_a_session_killed_at_any_write_is_resumed_to_the_same_files(told, tmp_path):
-    _, recording = told
+def test_a_session_killed_at_any_write_is_completed_without_loss(
+    written_story, tmp_path
+):
+    _, recording = written_story
     for number, disk in enumerate(kills(recording.operations)):
         disk.write(tmp_path / str(number))
         (folder,) = list_sessions(tmp_path / str(number))
@@ -310,18 +311,18 @@ def test_a_session_killed_at_any_write_is_resumed_to_the_same_files(told, tmp_pa
         left = [path.name for path in folder.path.rglob("*.*") if is_left(path)]
         assert left == []
         files = derived_files(folder)
-        lose_what_is_derived(folder)
+        lose_derived_files(folder)
         derive(folder, replay(folder.events()))
         assert derived_files(folder) == files
 
 
 def recordings(folder):
-    """Return the contents of all recordings that have their final names."""
+    """Contents of all recordings with their final names."""
     return {path.read_bytes() for path in folder.path.rglob("T*.mcap")}
 
 
 def is_left(path):
-    """Return whether a kill has left a file that nobody needs."""
+    """Whether the file is a useless remnant of a kill."""
     is_partial = path.suffix == ".partial" and path.parent.name == "trials"
     return path.suffix == ".tmp" or is_partial
 
@@ -329,7 +330,7 @@ def is_left(path):
 # --- a session of format 1.0 ----------------------------------------------------------
 
 
-def test_a_session_that_left_numbers_to_its_sidecars_is_in_line(tmp_path):
+def test_a_recorded_session_of_format_1_0_is_consistent(tmp_path):
     with tarfile.open(SESSION) as archive:
         archive.extractall(tmp_path, filter="data")
     (folder,) = list_sessions(tmp_path)
@@ -344,7 +345,7 @@ def test_lost_sidecars_of_format_1_0_are_derived_from_journal_and_recordings(tmp
     (folder,) = list_sessions(tmp_path)
     paths = sorted(folder.trials.glob("T??.json"))
     before = [read_json(path) for path in paths]
-    lose_what_is_derived(folder)
+    lose_derived_files(folder)
     derive(folder, replay(folder.events()))
     of_review = {"ratio", "coverage", "slips", "v_t", "traces"}
     for path, fields in zip(paths, before, strict=True):

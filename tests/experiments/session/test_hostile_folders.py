@@ -1,4 +1,4 @@
-"""A session folder that somebody else made writes and reads nothing outside itself."""
+"""Commands on a hostile session folder read and write nothing outside the folder."""
 
 import os
 import shutil
@@ -40,13 +40,13 @@ def data(recorded, tmp_path):
 
 @pytest.fixture
 def outside(tmp_path):
-    """Return a folder beside the data whose files must stay as they are."""
+    """A folder outside the data whose files must not change."""
     (tmp_path / "outside").mkdir()
     return tmp_path / "outside"
 
 
 def link(path, outside):
-    """Put `path` outside and leave a symbolic link to it."""
+    """Move `path` outside and leave a symbolic link to it."""
     target = outside / path.name
     shutil.move(path, target)
     path.symlink_to(target)
@@ -74,14 +74,14 @@ def test_nothing_is_written_through_a_link(data, config, outside, name, command)
 
 
 @pytest.mark.parametrize("name", FILES + FOLDERS)
-def test_status_names_a_link_and_ends_with_6(data, config, outside, name):
+def test_status_names_a_symbolic_link(data, config, outside, name):
     link(only_session(data) / name, outside)
     done = traction("status", "--data", data, "--config", config)
     assert done.code == 6
     assert f"{name} is a symbolic link" in done.err
 
 
-def test_other_sessions_are_still_counted(data, config, outside):
+def test_sessions_alongside_a_hostile_one_are_still_counted(data, config, outside):
     session = only_session(data)
     other = session.with_name(session.name.replace("S001", "S002"))
     shutil.copytree(session, other)
@@ -101,7 +101,7 @@ def test_a_pipe_is_named_and_not_waited_for(data, config, name):
 
 
 @pytest.mark.parametrize("name", ["events.jsonl", "trials/T01.mcap"])
-def test_a_file_with_another_name_elsewhere_is_refused(data, outside, name):
+def test_a_file_hard_linked_from_elsewhere_is_refused(data, outside, name):
     path = only_session(data) / name
     (outside / "other").hardlink_to(path)
     done = traction("verify", "S001", "--data", data)
@@ -109,8 +109,8 @@ def test_a_file_with_another_name_elsewhere_is_refused(data, outside, name):
     assert f"{name} has another name elsewhere" in done.err
 
 
-def test_a_file_with_two_names_in_its_session_is_read(data):
-    """A kill between two steps of a move leaves it so."""
+def test_a_file_hard_linked_within_its_session_is_read(data):
+    """A kill between two steps of a move leaves such a file."""
     path = only_session(data) / "trials" / "T01.mcap"
     (only_session(data) / "rejected" / "T01a.mcap").hardlink_to(path)
     assert len(sha256_of(path)) == 64
@@ -123,7 +123,7 @@ def test_a_temporary_file_that_is_a_link_is_not_followed(tmp_path, outside):
     assert (outside / "target").read_text() == "mine"
 
 
-def test_a_lock_that_is_a_link_locks_nothing(data, outside):
+def test_a_lock_that_is_a_link_is_refused(data, outside):
     link(only_session(data) / ".lock", outside)
     with (
         pytest.raises(TractionError, match="symbolic link"),
@@ -133,8 +133,8 @@ def test_a_lock_that_is_a_link_locks_nothing(data, outside):
 
 
 @pytest.mark.parametrize("name", ["trials/T01.json", "session.json", "events.jsonl"])
-def test_a_file_beyond_its_limit_is_named(data, config, name):
-    os.truncate(only_session(data) / name, 3 * 2**30)  # sparse: takes no room
+def test_a_file_beyond_its_size_limit_is_reported(data, config, name):
+    os.truncate(only_session(data) / name, 3 * 2**30)  # sparse: takes no space
     done = traction("status", "--data", data, "--config", config)
     assert done.code == 6
     assert "the limit is" in done.err
@@ -152,7 +152,7 @@ def test_a_file_beyond_its_limit_is_named(data, config, name):
     ],
     ids=lambda text: text[:30],
 )
-def test_a_sidecar_of_wrong_values_is_no_bug(data, config, content):
+def test_a_sidecar_with_wrong_values_crashes_no_command(data, config, content):
     (only_session(data) / "trials" / "T01.json").write_text(content)
     for command in COMMANDS:
         arguments = [a.format(data.parent) for a in command]
@@ -160,7 +160,7 @@ def test_a_sidecar_of_wrong_values_is_no_bug(data, config, content):
         assert done.code in (0, 2, 6), done.err
 
 
-def test_a_session_json_of_wrong_values_is_no_bug(data, config):
+def test_a_session_json_with_wrong_values_crashes_no_command(data, config):
     text = '{"phase": [], "operator": {"a": 1}, "kept": 5, "force_drift": "x"}'
     (only_session(data) / "session.json").write_text(text)
     for command in COMMANDS:
@@ -192,7 +192,7 @@ def test_a_journal_line_without_a_checksum_is_left_out(data):
     assert "events.jsonl has a wrong checksum in line 4" in done.err
 
 
-def test_names_of_journal_and_sidecars_are_forced_to_the_disk(data, monkeypatch):
+def test_folders_of_journal_and_sidecars_are_synced_to_disk(data, monkeypatch):
     synced = set()
     usual = os.fsync
 
@@ -207,7 +207,7 @@ def test_names_of_journal_and_sidecars_are_forced_to_the_disk(data, monkeypatch)
     assert folders <= synced
 
 
-def test_a_new_journal_has_its_name_forced_to_the_disk(data, monkeypatch):
+def test_the_folder_of_a_new_journal_is_synced_to_disk(data, monkeypatch):
     session = find_session(data, "S001")
     (session.path / "events.jsonl").unlink()
     synced = set()

@@ -13,14 +13,14 @@ pytestmark = pytest.mark.slow  # whole sessions
 
 @pytest.fixture
 def data(recorded, tmp_path):
-    """Return a data folder with two kept trials that may be spoiled."""
+    """A data folder with two kept trials that tests may damage."""
     shutil.copytree(recorded.data, tmp_path / "data")
     return tmp_path / "data"
 
 
 @pytest.fixture
-def spoiled(data):
-    """Return the same with a sidecar deleted and another trial cut."""
+def damaged(data):
+    """The same data with one sidecar deleted and another trial truncated."""
     trials = only_session(data) / "trials"
     (trials / "T01.json").unlink()
     cut(trials / "T02.mcap")
@@ -44,7 +44,7 @@ def test_the_journal_has_checksum_and_size_of_every_kept_trial(recorded):
     assert [(event["sha256"], event["size"]) for event in kept] == wanted
 
 
-def test_a_trial_that_is_kept_later_has_its_checksum_in_the_journal(data):
+def test_a_trial_kept_after_the_session_has_its_checksum_in_the_journal(data):
     for verdict in ("reject", "keep"):
         done = traction("verdict", "S001", "T01a", verdict, "why", "--data", data)
         assert done.code == 0, done.err
@@ -57,11 +57,11 @@ def test_a_sound_session_has_no_deviations(data):
     assert files(data) == set()
 
 
-def test_missing_and_changed_files_are_named(spoiled):
-    assert files(spoiled) == {"trials/T01.json", "trials/T02.mcap"}
+def test_missing_and_changed_files_are_named(damaged):
+    assert files(damaged) == {"trials/T01.json", "trials/T02.mcap"}
 
 
-def test_a_trial_changed_together_with_its_sidecar_is_found(data):
+def test_a_trial_changed_together_with_its_sidecar_is_named(data):
     path = only_session(data) / "trials" / "T01.mcap"
     cut(path)
     fields = sidecar(path) | {"sha256": digest(path)}
@@ -77,8 +77,8 @@ def _missing(session):
     (session / "events.jsonl").unlink()
 
 
-def _cut_behind_first(session):
-    """Leave the journal up to the line that kept T01."""
+def _cut_after_first_kept(session):
+    """Truncate the journal after the line that kept T01."""
     path = session / "events.jsonl"
     lines = path.read_bytes().splitlines(keepends=True)
     first = next(i for i, line in enumerate(lines) if b"trial-kept" in line)
@@ -92,25 +92,32 @@ def _without_a_keep(session):
     path.write_bytes(b"".join(lines[:last] + lines[last + 1 :]))
 
 
-def _without_a_note(session):
-    """Take a line away that changes no state."""
+def _without_a_tare(session):
+    """Remove a line that changes no state."""
     path = session / "events.jsonl"
     lines = path.read_bytes().splitlines(keepends=True)
     first = next(i for i, line in enumerate(lines) if b"tared" in line)
     path.write_bytes(b"".join(lines[:first] + lines[first + 1 :]))
 
 
-def _twice(session):
+def _with_a_line_twice(session):
     path = session / "events.jsonl"
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join([*lines[:3], lines[2], *lines[3:]]))
 
 
-LOSSES = (_empty, _missing, _cut_behind_first, _without_a_keep, _without_a_note, _twice)
+LOSSES = (
+    _empty,
+    _missing,
+    _cut_after_first_kept,
+    _without_a_keep,
+    _without_a_tare,
+    _with_a_line_twice,
+)
 
 
 @pytest.mark.parametrize("lose", LOSSES)
-def test_a_journal_that_lost_lines_is_named(data, lose):
+def test_a_damaged_journal_is_named(data, lose):
     lose(only_session(data))
     assert "events.jsonl" in files(data)
     done = traction("verify", "--all", "--data", data)
@@ -119,7 +126,7 @@ def test_a_journal_that_lost_lines_is_named(data, lose):
 
 
 @pytest.mark.parametrize("lose", LOSSES)
-def test_no_report_is_made_of_a_session_whose_journal_lost_lines(data, lose):
+def test_no_report_is_made_of_a_session_with_a_damaged_journal(data, lose):
     lose(only_session(data))
     done = traction("report", "S001", "--data", data)
     assert done.code == 6
@@ -128,10 +135,10 @@ def test_no_report_is_made_of_a_session_whose_journal_lost_lines(data, lose):
 
 @pytest.mark.parametrize("lose", LOSSES)
 @pytest.mark.parametrize("command", [("resume", "S001"), ("redo", "S001", "T01")])
-def test_a_session_whose_journal_lost_lines_is_not_opened_nor_changed(
+def test_a_session_with_a_damaged_journal_is_neither_opened_nor_changed(
     data, lose, command
 ):
-    """What follows from the journal would be the only witness of the loss."""
+    """The derived files are the only evidence of what the journal lost."""
     session = only_session(data)
     lose(session)
     before = {p: p.read_bytes() for p in session.rglob("*.*") if p.name != ".lock"}
@@ -142,8 +149,8 @@ def test_a_session_whose_journal_lost_lines_is_not_opened_nor_changed(
     assert after == before
 
 
-@pytest.mark.parametrize("lose", [_empty, _missing, _cut_behind_first])
-def test_a_changed_trial_is_found_without_the_journal(data, lose):
+@pytest.mark.parametrize("lose", [_empty, _missing, _cut_after_first_kept])
+def test_a_changed_recording_is_named_without_the_journal(data, lose):
     session = only_session(data)
     lose(session)
     path = session / "trials" / "T02.mcap"
@@ -154,8 +161,8 @@ def test_a_changed_trial_is_found_without_the_journal(data, lose):
     assert "trials/T02.mcap" in files(data)
 
 
-@pytest.mark.parametrize("lose", [_empty, _missing, _cut_behind_first])
-def test_a_trial_that_is_gone_is_missed_without_the_journal(data, lose):
+@pytest.mark.parametrize("lose", [_empty, _missing, _cut_after_first_kept])
+def test_a_missing_recording_is_named_without_the_journal(data, lose):
     session = only_session(data)
     lose(session)
     for path in session.glob("trials/T02.*"):
@@ -163,13 +170,13 @@ def test_a_trial_that_is_gone_is_missed_without_the_journal(data, lose):
     assert "trials/T02.mcap" in files(data)
 
 
-def test_nothing_found_is_not_all_well(tmp_path):
+def test_verify_fails_without_any_session(tmp_path):
     done = traction("verify", "--all", "--data", tmp_path)
     assert done.code == 2
     assert f"There is no session in {tmp_path / 'sessions'}" in done.err
 
 
-def test_a_session_that_was_renamed_is_named(data):
+def test_a_session_folder_with_a_foreign_name_is_reported(data):
     session = only_session(data)
     session.rename(session.with_name("my favourite"))
     done = traction("verify", "--all", "--data", data)
@@ -177,7 +184,7 @@ def test_a_session_that_was_renamed_is_named(data):
     assert "my favourite holds a journal, and is not called like a session" in done.err
 
 
-def test_a_sidecar_that_the_journal_does_not_know_is_named(data):
+def test_a_sidecar_unknown_to_the_journal_is_named(data):
     trials = only_session(data) / "trials"
     for suffix in (".mcap", ".json"):
         shutil.copy(trials / f"T01{suffix}", trials / f"T09{suffix}")
@@ -200,16 +207,16 @@ def test_a_sidecar_that_the_journal_does_not_know_is_named(data):
     ],
     ids=" ".join,
 )
-def test_a_command_names_what_is_missing_and_ends_with_6(spoiled, config, arguments):
-    arguments = [a.format(spoiled.parent) for a in arguments]
-    done = traction(*arguments, "--data", spoiled, "--config", config)
+def test_a_command_fails_and_names_a_damaged_recording(damaged, config, arguments):
+    arguments = [a.format(damaged.parent) for a in arguments]
+    done = traction(*arguments, "--data", damaged, "--config", config)
     assert done.code == 6
     assert "trials/T02.mcap" in done.err
-    assert not (spoiled.parent / "tables").exists()
+    assert not (damaged.parent / "tables").exists()
 
 
-def test_verify_lists_deviations_as_json(spoiled):
-    done = traction("verify", "--all", "--json", "--data", spoiled)
+def test_verify_lists_deviations_as_json(damaged):
+    done = traction("verify", "--all", "--json", "--data", damaged)
     assert done.code == 6
     found = {(row["session"], row["file"]) for row in json.loads(done.out)}
     assert found == {("S001", "trials/T01.json"), ("S001", "trials/T02.mcap")}
@@ -219,7 +226,7 @@ def test_verify_accepts_a_sound_session(data):
     assert traction("verify", "S001", "--data", data).code == 0
 
 
-def test_verify_wants_sessions_or_all(data):
+def test_verify_requires_sessions_or_all(data):
     assert traction("verify", "--data", data).code == 2
 
 
@@ -227,8 +234,10 @@ def test_verify_wants_sessions_or_all(data):
     ("lost", "exported"),
     [("T01.mcap", ["T02.csv"]), ("T01.json", ["T01.csv", "T02.csv"])],
 )
-def test_what_is_left_is_exported_if_that_is_allowed(data, config, lost, exported):
-    """The journal keeps a trial, and a sidecar follows: it is named, and no more."""
+def test_the_remaining_trials_are_exported_with_allow_missing(
+    data, config, lost, exported
+):
+    """A lost sidecar is only named: the journal says that the trial is kept."""
     (only_session(data) / "trials" / lost).unlink()
     to = data.parent / "tables"
     arguments = ("export", "S001", "--to", to, "--allow-missing")
@@ -238,7 +247,7 @@ def test_what_is_left_is_exported_if_that_is_allowed(data, config, lost, exporte
     assert sorted(path.name for path in to.glob("*/T0?.csv")) == exported
 
 
-def test_a_report_without_a_kept_trial_says_so_at_its_top(data, config):
+def test_a_report_names_a_missing_sidecar_at_its_top(data, config):
     (only_session(data) / "trials" / "T01.json").unlink()
     arguments = ("report", "S001", "--allow-missing")
     done = traction(*arguments, "--data", data, "--config", config)
@@ -252,7 +261,7 @@ def test_a_report_without_a_kept_trial_says_so_at_its_top(data, config):
 
 @pytest.fixture
 def copied(data):
-    """Return data in which the session was copied under another number."""
+    """Data in which the session was copied under another number."""
     folder = only_session(data)
     name = folder.name.replace("_S001_", "_S002_")
     shutil.copytree(folder, folder.with_name(name))
@@ -286,16 +295,16 @@ def test_a_report_counts_a_recording_once(copied, config):
     fits = json.loads((page.parent.parent / "fits.json").read_text())
     (terrain,) = fits["terrains"].values()
     assert terrain["trials"] == 2
-    told = json.loads(
+    report = json.loads(
         traction("report", "--all", "--allow-missing", "--json", *where).out
     )
-    assert told["left_out"] == [
+    assert report["left_out"] == [
         "S002 T01 is the same recording as S001 T01",
         "S002 T02 is the same recording as S001 T02",
     ]
 
 
-def test_a_session_under_another_number_alone_counts(data):
+def test_a_renumbered_session_without_a_copy_counts(data):
     folder = only_session(data)
     folder.rename(folder.with_name(folder.name.replace("_S001_", "_S004_")))
     done = traction("status", "--json", "--data", data)
@@ -304,23 +313,25 @@ def test_a_session_under_another_number_alone_counts(data):
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "deviation"),
     [
         (lambda name: name.removesuffix(".fake"), "is of simulated trials"),
         (lambda name: name.replace("_TF", "_S0"), "is of TF"),
     ],
 )
-def test_a_name_that_says_otherwise_than_the_journal_does_not_count(data, change, said):
+def test_a_session_whose_name_contradicts_its_journal_does_not_count(
+    data, change, deviation
+):
     folder = only_session(data)
     folder.rename(folder.with_name(change(folder.name)))
     done = traction("verify", "--all", "--data", data)
-    assert (done.code, said in done.err) == (6, True)
+    assert (done.code, deviation in done.err) == (6, True)
     status = traction("status", "--json", "--data", data)
     assert status.code == 6
     assert [row for row in json.loads(status.out) if row["kept"]] == []
 
 
-def test_a_copy_of_the_same_number_is_named_and_does_not_count(data):
+def test_a_copy_with_the_same_number_is_named_and_does_not_count(data):
     folder = only_session(data)
     shutil.copytree(folder, folder.with_name("2099-01-01" + folder.name[10:]))
     done = traction("verify", "--all", "--data", data)
@@ -334,7 +345,7 @@ def test_a_copy_of_the_same_number_is_named_and_does_not_count(data):
 
 
 @pytest.mark.parametrize("text", [None, "{"])
-def test_a_lost_summary_is_named(data, text):
+def test_a_missing_or_damaged_session_json_is_named(data, text):
     path = only_session(data) / "session.json"
     path.unlink()
     if text is not None:

@@ -15,17 +15,17 @@ def folder(tmp_path):
 
 
 def hold_elsewhere(folder):
-    """Return a process that holds the lock until it is killed."""
-    ready, told = os.pipe()
+    """Process that holds the lock until it is killed."""
+    ready, locked = os.pipe()
     child = os.fork()
     if child == 0:
         with session_lock(folder):
-            os.write(told, b"!")
+            os.write(locked, b"!")
             signal.pause()
         os._exit(0)
     os.read(ready, 1)
     os.close(ready)
-    os.close(told)
+    os.close(locked)
     return child
 
 
@@ -68,7 +68,7 @@ def test_a_lock_is_not_taken_twice_in_one_process(folder):
         pytest.fail("two have it")
 
 
-def test_a_damaged_lock_file_is_no_obstacle(folder):
+def test_a_damaged_lock_file_does_not_block_a_session(folder):
     (folder.path / ".lock").write_bytes(b"\xff[")
     with session_lock(folder):
         assert owner_of(folder).pid == os.getpid()

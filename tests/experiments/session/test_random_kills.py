@@ -1,4 +1,4 @@
-"""A session is killed at random moments, again and again, and resumed every time."""
+"""Sessions killed at random moments are resumed without losing a kept trial."""
 
 import os
 import signal
@@ -21,7 +21,7 @@ CLOCK = SystemClock()
 
 
 def run_until(config, data, seconds):
-    """Run or resume a session in a child, kill it after `seconds`; return how."""
+    """Run or resume a session in a child, kill it after `seconds`; its wait status."""
     child = os.fork()
     if child == 0:
         with Path(os.devnull).open("w") as nothing:
@@ -47,21 +47,21 @@ def run_or_resume(config, data):
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-def test_eight_kills_are_survived_and_no_kept_trial_is_lost(tmp_path, config):
+def test_a_few_random_kills_lose_no_kept_trial(tmp_path, config):
     assert survive(tmp_path, config, 8, np.random.default_rng(7)) >= 1
 
 
 @pytest.mark.long
 @pytest.mark.timeout(1800)
-def test_two_hundred_kills_are_survived_and_no_kept_trial_is_lost(tmp_path, config):
+def test_many_random_kills_lose_no_kept_trial(tmp_path, config):
     assert survive(tmp_path, config, 200, np.random.default_rng(8)) >= 10
 
 
 def survive(tmp_path, config, count, rng):
-    """Kill sessions `count` times; return how many were completed in between.
+    """Kill sessions `count` times; the number of sessions completed in between.
 
-    After each kill the kept trials have to be the sound files, those of before among
-    them, and what is not killed has to come to its end.
+    After each kill the kept trials must be intact and include all earlier ones; a
+    session that is not killed must end without an error.
     """
     kills = number = completed = 0
     while kills < count:
@@ -90,7 +90,7 @@ def survive(tmp_path, config, count, rng):
             ):
                 completed += state.is_complete
                 break
-        else:  # a slow computer has not come to an end between two kills
+        else:  # a slow computer never finished between two kills
             assert run_or_resume(config, data) == 0
             (folder,) = list_sessions(data)
             now = {path.stem: digest(path) for path in folder.kept_trials()}

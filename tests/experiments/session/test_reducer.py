@@ -58,7 +58,7 @@ events = st.lists(
 def check_possible(state):
     assert len(set(state.kept)) == len(state.kept)
     assert all(attempt.name.number >= 1 for attempt in state.attempts)
-    # nothing is kept that was never attempted, or whose newest verdict is another
+    # every kept attempt exists, and its latest verdict is keep
     named = {(a.name.number, a.name.attempt): a.verdict.verdict for a in state.attempts}
     kept = {pair for pair, verdict in named.items() if verdict == "keep"}
     assert kept == set(state.kept_attempts)
@@ -87,7 +87,7 @@ def test_no_journal_leads_to_an_impossible_state(journal):
 
 
 @given(events)
-def test_no_journal_without_a_start_leads_anywhere_impossible(journal):
+def test_no_journal_without_a_start_leads_to_an_impossible_state(journal):
     check_possible(replay(journal))
 
 
@@ -100,7 +100,7 @@ def test_a_journal_can_be_replayed_in_two_parts(journal, cut):
 
 
 @given(events)
-def test_a_kept_trial_is_lost_by_nothing_but_a_word_on_it(journal):
+def test_only_a_verdict_or_setting_aside_removes_a_kept_trial(journal):
     states = [SessionState()]
     for entry in [*BEGIN, *attempt(1, "kept"), *journal]:
         states.append(apply(states[-1], entry))
@@ -114,7 +114,7 @@ def test_a_kept_trial_is_lost_by_nothing_but_a_word_on_it(journal):
 
 
 @given(events)
-def test_what_is_refused_changes_nothing_and_what_is_not_never_raises(journal):
+def test_refused_events_change_nothing_and_no_event_raises(journal):
     state = replay(BEGIN)
     for entry in journal:
         after = apply(state, entry)
@@ -132,7 +132,7 @@ def test_a_session_is_complete_when_enough_trials_were_kept_and_it_has_ended():
     assert apply(state, END).phase is SessionPhase.COMPLETE
 
 
-def test_a_rejected_trial_is_done_again_under_its_number():
+def test_a_rejected_trial_is_repeated_under_its_number():
     state = replay([*BEGIN, *attempt(1, "rejected")])
     assert (state.next_trial, state.attempt(1), state.rejected) == (1, 1, 1)
     state = replay([*BEGIN, *attempt(1, "rejected"), *attempt(1, "kept")])
@@ -165,7 +165,7 @@ def test_an_end_in_a_running_trial_is_a_crash():
     assert (state.phase, state.running) == (SessionPhase.CRASHED, 1)
 
 
-def test_a_crashed_session_is_not_resumed_before_its_trial_was_put_away():
+def test_a_crashed_session_is_not_resumed_before_its_trial_is_rejected():
     crashed = replay([*BEGIN, event("trial-started", 1), event("crash-found")])
     resumed = event("session-resumed")
     assert refusal(crashed, resumed) == "T01 has no verdict yet"
@@ -173,7 +173,7 @@ def test_a_crashed_session_is_not_resumed_before_its_trial_was_put_away():
     assert (state.phase, state.openings) == (SessionPhase.PREFLIGHT, 2)
 
 
-def test_a_redo_records_one_trial_and_is_over():
+def test_a_redo_records_one_trial_and_ends():
     whole = [*BEGIN, *attempt(1, "kept"), *attempt(2, "kept"), END]
     state = replay([*whole, event("redo-started", 1), ACTIVE])
     assert (state.next_trial, state.is_over) == (1, False)
@@ -195,12 +195,12 @@ def test_a_redo_whose_verdict_is_undone_is_not_over():
     assert (state.redoing, state.is_over) == (None, True)
 
 
-def test_a_redo_of_what_was_never_recorded_is_refused():
+def test_a_redo_of_an_unrecorded_trial_is_refused():
     state = replay([*BEGIN, *attempt(1, "kept"), END])
     assert refusal(state, event("redo-started", 2)) == "T02 was never recorded"
 
 
-def test_a_verdict_changes_what_is_kept_and_back():
+def test_a_verdict_change_updates_the_kept_trials_and_can_be_undone():
     state = replay([*BEGIN, *attempt(1, "kept"), *attempt(2, "kept"), END])
     state = apply(state, verdict(1, 1, "reject"))
     assert (state.kept, state.rejected, state.phase) == (
@@ -217,7 +217,7 @@ def test_a_verdict_changes_what_is_kept_and_back():
 
 
 @pytest.mark.parametrize("what", ["kept", "rejected"])
-def test_a_verdict_that_is_so_already_changes_nothing(what):
+def test_a_repeated_verdict_changes_nothing(what):
     state = replay([*BEGIN, *attempt(1, what), *attempt(2, "kept"), END])
     again = verdict(1, 1, {"kept": "keep", "rejected": "reject"}[what])
     assert refusal(state, again) == ""
@@ -235,18 +235,18 @@ def crashed_in_the_second_attempt():
     return replay([*BEGIN, *attempt(1, "rejected"), *second])
 
 
-def test_a_crashed_trial_is_not_redone_before_it_was_put_away():
+def test_a_crashed_trial_is_not_redone_before_it_has_a_verdict():
     state = crashed_in_the_second_attempt()
     assert refusal(state, event("redo-started", 1)) == "T01 has no verdict yet"
 
 
-def test_a_crashed_trial_keeps_nobody_from_judging_an_earlier_attempt():
+def test_an_earlier_attempt_at_a_crashed_trial_can_still_be_judged():
     state = crashed_in_the_second_attempt()
     assert refusal(state, verdict(1, 1, "keep")) == ""
     assert refusal(state, verdict(1, 2, "keep")) == "T01 has no verdict yet"
 
 
-# --- the bracket of the tares -------------------------------------------------------
+# --- drift between the tares --------------------------------------------------------
 
 
 def tared(*force):
@@ -262,7 +262,7 @@ def test_two_tares_bracket_the_drift_of_the_force():
     assert later.drift == (-0.1, -0.2, -0.3)
 
 
-def test_one_tare_is_no_bracket():
+def test_one_tare_gives_no_drift():
     assert replay([*BEGIN, tared(0.1, 0.2, 0.3)]).drift == ()
 
 
@@ -272,7 +272,7 @@ def test_equal_tares_show_no_drift():
     )
 
 
-def test_every_opening_has_a_bracket_of_its_own():
+def test_every_opening_of_a_session_has_its_own_pair_of_tares():
     closed = {"event": "session-ended", "reason": "unfinished"}
     events = [*BEGIN, tared(0.1, 0.2, 0.3), tared(1.0, 1.0, 1.0), closed]
     again = [*events, {"event": "session-resumed"}, ACTIVE]
@@ -290,7 +290,7 @@ def test_a_damaged_tare_changes_nothing(bias):
     assert replay([*sound, {"event": "tared", "bias": bias}]) == replay(sound)
 
 
-def test_a_session_without_events_wants_and_has_nothing():
+def test_a_session_without_events_is_empty():
     state = replay([])
     assert (state.wanted, state.rejected, state.openings, state.tares) == (0, 0, 0, 0)
     assert (state.kept, state.running, state.redoing, state.ended) == (
@@ -302,7 +302,7 @@ def test_a_session_without_events_wants_and_has_nothing():
 
 
 @pytest.mark.parametrize("value", [0, -1, 2.5, True, "3", None])
-def test_a_number_of_trials_that_is_none_counts_as_zero(value):
+def test_an_invalid_number_of_trials_counts_as_zero(value):
     started = {"event": "session-started", "terrain": "TF", "trials": value}
     assert replay([started]).wanted == 0
 
@@ -323,7 +323,7 @@ def test_a_verdict_that_is_neither_keep_nor_reject_is_refused(verdict):
     assert refusal(replay(events), {**changed, "verdict": "reject"}) == ""
 
 
-def test_a_drift_is_told_to_a_millinewton():
+def test_a_drift_is_rounded_to_a_millinewton():
     state = replace(
         replay([]), tares=2, first_bias=(0.0,) * 6, last_bias=(0.12345,) * 6
     )
@@ -332,7 +332,7 @@ def test_a_drift_is_told_to_a_millinewton():
 
 
 @pytest.mark.parametrize(
-    ("told", "ended"),
+    ("reason", "ended"),
     [
         ("complete", "complete"),
         ("quit", "quit"),
@@ -340,6 +340,6 @@ def test_a_drift_is_told_to_a_millinewton():
         (None, "unfinished"),
     ],
 )
-def test_a_session_ends_for_the_reason_that_was_told(told, ended):
-    end = {"event": Event.ENDED, "reason": told}
+def test_a_session_ends_with_the_recorded_reason(reason, ended):
+    end = {"event": Event.ENDED, "reason": reason}
     assert replay([*BEGIN, end]).ended == ended

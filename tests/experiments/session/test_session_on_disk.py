@@ -36,22 +36,22 @@ def cycles(first_trial):
     return TrialReader(first_trial).cycles()
 
 
-def test_a_session_ends_with_exit_code_0(recorded):
+def test_a_complete_session_ends_without_an_error(recorded):
     assert recorded.done.code == 0
     assert recorded.done.err == ""
     assert "ARM: idle; it sinks slowly, support it." in recorded.done.out
 
 
-def test_a_session_says_how_to_go_on(recorded):
+def test_a_complete_session_names_the_next_command(recorded):
     *_, next_step, _, _ = recorded.done.out.splitlines()
     assert next_step == f"Complete. Next: traction report S001 --data {recorded.data}"
 
 
-def test_the_folder_of_a_simulated_session_says_so(recorded):
+def test_the_folder_name_marks_a_simulated_session(recorded):
     assert re.fullmatch(r"\d{4}-\d\d-\d\d_S001_TF\.fake", recorded.folder.name)
 
 
-def test_the_folder_holds_what_it_should(recorded):
+def test_the_folder_holds_exactly_the_expected_files(recorded):
     folder = recorded.folder
     files = {path.name for path in folder.iterdir() if path.is_file()}
     assert files == SESSION_FILES
@@ -60,13 +60,13 @@ def test_the_folder_holds_what_it_should(recorded):
     assert list((folder / "faults").iterdir()) == []
 
 
-def test_the_settings_of_a_session_are_kept_word_for_word(recorded, config):
+def test_the_settings_of_a_session_are_copied_byte_for_byte(recorded, config):
     for name, kept in (("rig.toml", "config.toml"), ("matrix.toml", "matrix.toml")):
         text = config.with_name(name).read_bytes()
         assert (recorded.folder / kept).read_bytes() == text
 
 
-def test_the_journal_replays_to_what_session_json_says(recorded):
+def test_the_replayed_journal_agrees_with_session_json(recorded):
     state = replay(journal(recorded.folder))
     fields = json.loads((recorded.folder / "session.json").read_text())
     assert (
@@ -92,17 +92,19 @@ def test_trial_files_are_read_only(recorded):
         assert stat.S_IMODE(path.stat().st_mode) == 0o444
 
 
-def test_trial_files_stand_a_second_verification(recorded):
+def test_trial_files_pass_a_second_verification(recorded):
     for path in (recorded.folder / "trials").glob("*.mcap"):
         assert verify_file(path).sha256 == digest(path)
 
 
-def test_the_loop_ran_at_500_hz_without_a_gap(cycles):
+def test_the_loop_ran_at_its_rate_without_a_gap(cycles):
     assert set(np.diff(cycles.data["cycle"].astype(int)).tolist()) == {1}
     assert set(np.diff(cycles.data["host_ns"].astype(int)).tolist()) == {2_000_000}
 
 
-def test_a_trial_reaches_from_the_pre_roll_to_the_end_of_travel(cycles, first_trial):
+def test_a_trial_has_all_cycles_of_its_duration_and_the_whole_travel(
+    cycles, first_trial
+):
     fields = sidecar(first_trial)
     lasted = len(cycles.data) / 500
     assert lasted == pytest.approx(fields["duration"], abs=0.003)  # one period
@@ -117,10 +119,10 @@ def test_every_cycle_is_marked_as_simulated_active_and_fresh(cycles):
 
 
 def test_rosbags_finds_every_topic(first_trial):
-    found = messages_of(first_trial)
-    assert set(found) == set(TRIAL_TOPICS)
-    assert "/can/raw" not in found
-    assert all(found.values())
+    messages = messages_of(first_trial)
+    assert set(messages) == set(TRIAL_TOPICS)
+    assert "/can/raw" not in messages
+    assert all(messages.values())
 
 
 def test_rosbags_reads_the_same_cycles_bit_for_bit(first_trial, cycles):
@@ -129,7 +131,7 @@ def test_rosbags_reads_the_same_cycles_bit_for_bit(first_trial, cycles):
     assert cycles.log_time.tolist() == [time for time, _ in theirs]
 
 
-def test_views_repeat_the_cycle_of_their_time(first_trial, cycles):
+def test_joint_states_repeat_the_cycle_of_their_time(first_trial, cycles):
     theirs = messages_of(first_trial)
     row = {int(t): i for i, t in enumerate(cycles.log_time)}
     assert len(theirs["/joint_states"]) == pytest.approx(len(row) / 10, abs=1)
@@ -140,7 +142,7 @@ def test_views_repeat_the_cycle_of_their_time(first_trial, cycles):
         assert view.effort.tolist() == record["torque_command"].tolist()
 
 
-def test_sensor_samples_are_all_there_at_their_own_rate(first_trial):
+def test_sensor_samples_are_complete_at_their_own_rate(first_trial):
     batches = [
         decode("traction_msgs/msg/WrenchBatch", payload)
         for _, payload in messages_of(first_trial)["/ft/raw"]

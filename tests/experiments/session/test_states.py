@@ -4,7 +4,7 @@ from acquisition.control_loop.states import TRANSITIONS
 from experiments.session.states import OPEN, TABLE, Event, SessionPhase
 from tests.experiments.program import traction
 
-# (phase, event): where it leads; what is not here is refused.
+# (phase, event): the possible next phases; any other pair is refused.
 LEADS = {
     ("planned", "session-started"): "preflight",
     ("preflight", "activated"): "ready",
@@ -57,7 +57,7 @@ PAIRS = [(phase, event) for phase in SessionPhase for event in Event]
 
 
 @pytest.mark.parametrize(("phase", "event"), PAIRS)
-def test_every_pair_leads_where_it_should_or_is_refused_with_a_reason(phase, event):
+def test_every_event_leads_to_its_phase_or_is_refused_with_a_reason(phase, event):
     step = TABLE[phase, event]
     assert " ".join(step.to) == LEADS.get((phase, event), "")
     assert bool(step.refused) is not bool(step.to)

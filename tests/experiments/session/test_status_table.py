@@ -1,4 +1,4 @@
-"""The table counts what is on the disk now, however often it is asked."""
+"""The status table counts what is on the disk now, however often it is read."""
 
 import os
 
@@ -14,7 +14,7 @@ from experiments.session.where import Where, parse_where
 
 @pytest.fixture
 def data(tmp_path):
-    """Return a data folder of two sessions."""
+    """A data folder of two sessions."""
     make_sessions(tmp_path / "data", 2, trials=2, size=64)
     return tmp_path / "data"
 
@@ -24,14 +24,14 @@ def recording(data):
 
 
 def look(data, digest):
-    """Return the kept trials by session and the deviations."""
+    """Kept trials by session, and the deviations."""
     seen = summarise_sessions(data, Where(), digest)
     kept = {s.folder.id: s.summary.kept for s in seen}
     return kept, [d.text() for d in find_deviations(seen, Where())]
 
 
 def overwrite(path):
-    """Change a byte and put the time of the last change back."""
+    """Change a byte and restore the modification time."""
     times = path.stat()
     content = path.read_bytes()
     path.write_bytes(bytes([content[0] ^ 1]) + content[1:])
@@ -63,7 +63,7 @@ def turn_into_link(path):
 @pytest.mark.parametrize(
     "change", [overwrite, replace_by_another, lengthen, remove, turn_into_link]
 )
-def test_a_recording_that_changes_while_it_is_followed_is_noticed(data, change):
+def test_a_recording_changed_between_two_reads_is_noticed(data, change):
     digest = Checksums()
     assert look(data, digest) == ({"S001": ("T01", "T02"), "S002": ("T01", "T02")}, [])
     change(recording(data))
@@ -72,7 +72,7 @@ def test_a_recording_that_changes_while_it_is_followed_is_noticed(data, change):
     assert any("S001" in text for text in deviations)
 
 
-def test_a_file_that_stays_as_it_is_is_read_once(data, monkeypatch):
+def test_an_unchanged_file_is_hashed_once(data, monkeypatch):
     read = []
     monkeypatch.setattr(
         "experiments.session.data_files.sha256_of",
@@ -84,7 +84,7 @@ def test_a_file_that_stays_as_it_is_is_read_once(data, monkeypatch):
     assert read == ["T01.mcap"]
 
 
-def test_conditions_hash_no_other_session(data, monkeypatch):
+def test_sessions_outside_the_conditions_are_not_hashed(data, monkeypatch):
     summarised = []
     usual = summaries.summarise
 

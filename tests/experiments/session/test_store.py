@@ -42,7 +42,7 @@ def test_a_number_is_never_used_twice_even_after_a_gap(tmp_path):
     assert create(tmp_path).id == "S042"
 
 
-def test_what_is_no_session_is_not_listed(tmp_path):
+def test_folders_that_are_not_sessions_are_not_listed(tmp_path):
     create(tmp_path)
     for name in ("notes", "2027-01-15_S1_S0", "2027-01-15_S002_S0.fakes", "S003"):
         (tmp_path / "sessions" / name).mkdir()
@@ -64,7 +64,7 @@ def test_a_torn_last_line_of_the_journal_is_left_out(tmp_path):
 
 
 def record(session, number, verdict, *, is_sound=True):
-    """Record a trial without a sidecar, and judge it in the journal alone."""
+    """Record a trial without a sidecar; its verdict is in the journal only."""
     path = session.trials / f"T{number:02d}.mcap"
     path.write_bytes(b"trial %d" % number)
     sums = {"sha256": store.sha256_of(path) if is_sound else "0" * 64}
@@ -75,7 +75,7 @@ def record(session, number, verdict, *, is_sound=True):
     return path
 
 
-def test_trials_that_the_journal_keeps_count_where_their_checksum_is_right(tmp_path):
+def test_trials_kept_in_the_journal_count_if_their_checksum_is_right(tmp_path):
     session = create(tmp_path)
     session.append_event({"event": "session-started", "terrain": "S0", "trials": 4})
     session.append_event({"event": "activated"})
@@ -86,7 +86,7 @@ def test_trials_that_the_journal_keeps_count_where_their_checksum_is_right(tmp_p
     assert session.kept_trials() == [sound]
 
 
-def test_a_kept_trial_counts_before_its_files_have_followed(tmp_path):
+def test_a_kept_trial_counts_before_its_files_are_moved(tmp_path):
     session = create(tmp_path)
     session.append_event({"event": "session-started", "terrain": "S0", "trials": 1})
     session.append_event({"event": "activated"})
@@ -108,7 +108,7 @@ def test_json_is_replaced_whole_or_not_at_all(tmp_path, monkeypatch):
     assert read_json(path) == {"kept": 1}
 
 
-def test_a_full_disk_at_the_journal_is_a_message_not_a_crash(tmp_path):
+def test_a_journal_that_is_a_folder_is_reported(tmp_path):
     session = create(tmp_path)
     (session.path / "events.jsonl").mkdir()
     with pytest.raises(TrialFileError, match="is a folder"):
@@ -145,12 +145,12 @@ def test_utc_is_written_in_whole_seconds():
 @pytest.mark.parametrize(
     ("attempt", "name"), [(1, "T04a"), (26, "T04z"), (27, "T04aa"), (53, "T04ba")]
 )
-def test_rejected_attempts_are_lettered_like_columns(attempt, name):
+def test_rejected_attempts_are_lettered_like_spreadsheet_columns(attempt, name):
     assert TrialName(4, attempt).rejected == name
     assert TrialName(4, attempt).kept == "T04"
 
 
-def test_a_trial_ends_a_moment_after_the_container_was_crossed():
+def test_a_trial_ends_shortly_after_the_container_is_crossed():
     watch = EndDetector(0.45)
     assert watch.reason(5.0, 0.449) == ""
     assert watch.reason(6.0, 0.45) == ""
@@ -164,7 +164,7 @@ def test_a_trial_that_never_crosses_ends_at_the_time_limit():
     assert watch.reason(30.0, 0.2) == "time-limit"
 
 
-def test_a_console_that_nobody_reads_any_more_is_noticed(monkeypatch):
+def test_a_closed_console_is_noticed(monkeypatch):
     class Closed:
         def write(self, _):
             raise BrokenPipeError
@@ -188,7 +188,7 @@ def refuse(_):
     raise OSError(errno.ENOSPC, "No space left on device")
 
 
-def test_a_session_for_which_there_is_no_room_leaves_no_folder(tmp_path, monkeypatch):
+def test_a_session_that_fails_on_a_full_disk_leaves_no_folder(tmp_path, monkeypatch):
     create(tmp_path)
     with monkeypatch.context() as patch:
         patch.setattr(os, "fsync", refuse)
@@ -198,9 +198,7 @@ def test_a_session_for_which_there_is_no_room_leaves_no_folder(tmp_path, monkeyp
     assert create(tmp_path).id == "S002"
 
 
-def test_a_new_file_that_does_not_reach_the_disk_is_not_in_the_way(
-    tmp_path, monkeypatch
-):
+def test_a_new_file_that_cannot_be_synced_is_removed(tmp_path, monkeypatch):
     path = tmp_path / "gravity.toml"
     with monkeypatch.context() as patch:
         patch.setattr(os, "fsync", refuse)
@@ -213,7 +211,7 @@ def test_a_new_file_that_does_not_reach_the_disk_is_not_in_the_way(
     assert path.read_text() == "a"
 
 
-def test_a_file_that_is_given_for_a_session_is_told_what_reads_it(tmp_path):
+def test_a_file_given_as_a_session_is_refused_with_a_hint(tmp_path):
     folder = create(tmp_path)
     trial = folder.trials / "T01.mcap"
     trial.write_bytes(b"")
@@ -227,10 +225,10 @@ def test_a_file_that_is_given_for_a_session_is_told_what_reads_it(tmp_path):
 
 @pytest.mark.parametrize("terrain", ["G12.5dt", "G12dt+10", "B.0"])
 @pytest.mark.parametrize("is_simulated", [True, False])
-def test_a_session_is_found_by_a_terrain_with_signs_and_points(
+def test_a_terrain_name_with_signs_and_points_is_read_from_the_folder(
     tmp_path, terrain, is_simulated
 ):
     made = create_session(tmp_path, terrain, is_simulated=is_simulated, utc_ns=0)
-    (found,) = list_sessions(tmp_path)
-    assert (found.path, found.terrain) == (made.path, terrain)
-    assert found.is_simulated is is_simulated
+    (listed,) = list_sessions(tmp_path)
+    assert (listed.path, listed.terrain) == (made.path, terrain)
+    assert listed.is_simulated is is_simulated

@@ -35,13 +35,13 @@ def make_session(data, *events, terrain="S10"):
 
 
 def leave_partial(folder, name="T02"):
-    """Leave a `.partial` of 0.4 s as a kill does."""
+    """Leave a `.partial` of 0.4 s, as after a kill."""
     writer = write_trial(folder.trials / f"{name}.mcap", make_cycles(201), block=67)
     writer.close_partial()
     return writer.partial
 
 
-def test_a_session_that_was_not_closed_is_found(tmp_path):
+def test_a_crashed_session_is_found_with_its_running_trial(tmp_path):
     folder = make_session(tmp_path, *KEPT_AND_RUNNING)
     leave_partial(folder)
     (found,) = find_unfinished(tmp_path)
@@ -58,38 +58,38 @@ def test_a_session_that_is_complete_or_closed_is_not_unfinished(tmp_path):
     assert find_unfinished(tmp_path) == []
 
 
-def test_a_session_left_on_purpose_is_unfinished_and_no_crash(tmp_path):
+def test_a_session_left_on_purpose_is_unfinished_and_not_crashed(tmp_path):
     make_session(tmp_path, *KEPT_AND_RUNNING[:-1], LEFT)
     (found,) = find_unfinished(tmp_path)
     assert not found.is_crashed
     assert found.text() == "S001 S10 is unfinished, 1 of 10 kept."
 
 
-def test_a_folder_in_which_nothing_happened_is_none(tmp_path):
+def test_a_session_without_events_is_not_unfinished(tmp_path):
     make_session(tmp_path)
     assert find_unfinished(tmp_path / "nowhere") == find_unfinished(tmp_path) == []
 
 
-def test_a_session_of_a_living_process_is_none(tmp_path):
+def test_a_session_open_in_a_process_is_not_unfinished(tmp_path):
     folder = make_session(tmp_path, START)
     with session_lock(folder):
         assert find_unfinished(tmp_path) == []
     assert len(find_unfinished(tmp_path)) == 1
 
 
-def test_a_trial_without_verdict_is_told_apart(tmp_path):
+def test_a_crash_before_a_verdict_is_named(tmp_path):
     make_session(tmp_path, *KEPT_AND_RUNNING)
     (found,) = find_unfinished(tmp_path)
     assert "(T02 before its verdict)" in found.text()
 
 
-def test_a_session_left_between_trials_is_told_apart(tmp_path):
+def test_a_crash_between_trials_is_named(tmp_path):
     make_session(tmp_path, *KEPT_AND_RUNNING[:-1])
     (found,) = find_unfinished(tmp_path)
     assert "(between trials)" in found.text()
 
 
-def test_a_damaged_journal_or_partial_stops_nothing(tmp_path):
+def test_a_crashed_session_with_damaged_journal_and_partial_is_found(tmp_path):
     folder = make_session(tmp_path, *KEPT_AND_RUNNING)
     (folder.trials / "T02.mcap.partial").write_bytes(b"nothing")
     with (folder.path / "events.jsonl").open("ab") as journal:
@@ -98,18 +98,18 @@ def test_a_damaged_journal_or_partial_stops_nothing(tmp_path):
     assert (found.running, found.seconds) == ("T02", 0.0)
 
 
-def test_a_folder_that_cannot_be_read_is_left_out(tmp_path):
+def test_a_session_with_an_unreadable_journal_is_left_out(tmp_path):
     folder = make_session(tmp_path)
     (folder.path / "events.jsonl").mkdir()
     make_session(tmp_path, START)
     assert [found.folder.id for found in find_unfinished(tmp_path)] == ["S002"]
 
 
-# --- another run is asked for ---------------------------------------------------------
+# --- a new run while a session is unfinished ------------------------------------------
 
 
 def press(keys, found, terrain):
-    """Answer the question with `keys` from a keyboard, once it is on the screen."""
+    """Answer the question with `keys` from a keyboard once it is on the screen."""
     read, write = os.pipe()
     try:
         keyboard = TerminalInput(read)
@@ -130,7 +130,7 @@ def press(keys, found, terrain):
         (b"x n", ResumeChoice.CLOSE),
     ],
 )
-def test_a_key_says_what_becomes_of_the_unfinished_session(tmp_path, keys, choice):
+def test_a_key_resumes_or_closes_the_unfinished_session(tmp_path, keys, choice):
     make_session(tmp_path, START, ACTIVE, LEFT)
     assert press(keys, find_unfinished(tmp_path), "B0") is choice
 
@@ -144,7 +144,7 @@ def test_both_terrains_and_both_choices_are_named(tmp_path, capsys):
     )
 
 
-def test_a_crash_is_told_with_what_a_resume_does(tmp_path, capsys):
+def test_the_question_after_a_crash_says_what_a_resume_does(tmp_path, capsys):
     leave_partial(make_session(tmp_path, *KEPT_AND_RUNNING))
     press(b"r", find_unfinished(tmp_path), "S10")
     assert capsys.readouterr().out.startswith(
@@ -165,13 +165,13 @@ def test_without_a_terminal_a_run_is_refused_with_the_command_to_type(tmp_path, 
     assert len(list((tmp_path / "sessions").glob("*_S*"))) == 1
 
 
-def test_a_simulated_session_is_no_obstacle_to_a_real_one(tmp_path, config):
+def test_an_unfinished_simulated_session_does_not_block_a_real_one(tmp_path, config):
     make_session(tmp_path, START, ACTIVE, LEFT)
     done = traction("run", "TF", "--config", config, "--data", tmp_path)
-    assert "needs a person at a terminal" in done.err  # and nothing else is in the way
+    assert "needs a person at a terminal" in done.err  # the only obstacle
 
 
-def test_a_resume_lists_the_sessions_where_there_are_several(tmp_path):
+def test_resume_without_a_name_lists_several_unfinished_sessions(tmp_path):
     make_session(tmp_path, START, ACTIVE, LEFT)
     make_session(tmp_path, {**START, "terrain": "B0"}, terrain="B0")
     done = traction("resume", "--data", tmp_path)
@@ -183,13 +183,13 @@ def test_a_resume_lists_the_sessions_where_there_are_several(tmp_path):
     )
 
 
-def test_a_resume_of_nothing_is_refused(tmp_path):
+def test_resume_without_an_unfinished_session_is_refused(tmp_path):
     done = traction("resume", "--data", tmp_path)
     assert done.code == 2
     assert done.err.startswith("There is no unfinished session in")
 
 
-def test_real_and_simulated_sessions_are_not_taken_for_each_other(tmp_path):
+def test_a_real_session_is_not_resumed_with_a_simulated_arm(tmp_path):
     folder = create_session(tmp_path, "S10", is_simulated=False, utc_ns=10**18)
     for event in (START, ACTIVE, LEFT):
         folder.append_event(event)

@@ -30,7 +30,7 @@ FACTS = {"d50": 19.0, "moisture": "wet", "load": None, "incline_deg": -10.0}
         ("load!=-", False),
         ("load<5", False),
         ("moisture=wet,d50<19", False),
-        ("terrain=S0", True),  # not known of it
+        ("terrain=S0", True),  # not among the facts
     ],
 )
 def test_numbers_are_compared_and_words_are_equal_or_not(text, holds):
@@ -43,13 +43,13 @@ def test_numbers_are_compared_and_words_are_equal_or_not(text, holds):
     "text",
     ["d50~3", "hope=1", "d50", "=3", "d50>", "moisture<wet", "d50==3", "d50=>3"],
 )
-def test_what_is_no_condition_is_refused(text):
+def test_an_invalid_condition_is_refused(text):
     with pytest.raises(SettingsError):
         parse_where(text, ("d50", "moisture"))
 
 
 @pytest.mark.parametrize(
-    ("text", "says"),
+    ("text", "hint"),
     [
         ("terrain=s0", "There is B0, S0."),
         ("kind=fake", "There is live, simulated."),
@@ -59,19 +59,19 @@ def test_what_is_no_condition_is_refused(text):
         ("operator=ada", "There is none yet."),
     ],
 )
-def test_a_value_that_nothing_has_is_refused_and_the_known_ones_are_named(text, says):
+def test_an_unused_value_is_refused_and_the_known_values_are_named(text, hint):
     facts = [
         {"terrain": "S0", "incline_deg": 15.0, "kind": "live"},
         {"terrain": "B0", "incline_deg": 0.0, "kind": "simulated", "load": None},
     ]
     with pytest.raises(SettingsError) as refused:
         check_values(parse_where(text, ("load",)), facts)
-    assert refused.value.hint == says
+    assert refused.value.hint == hint
     check_values(parse_where("terrain=S0,incline_deg>99,kind=live"), facts)
 
 
 def matrix(order="randomised", **details):
-    """Return a matrix of three feet on stones of three sizes, dry and wet."""
+    """Matrix of three feet on stones of three sizes, dry and wet."""
     shipped = load_settings(None).matrix
     rows = tuple(
         shipped.terrains[0].model_copy(
@@ -92,7 +92,7 @@ def matrix(order="randomised", **details):
 NAMES = [row.name for row in matrix().terrains]
 
 
-def test_only_what_was_asked_for_is_suggested(tmp_path):
+def test_only_terrains_that_match_the_condition_are_suggested(tmp_path):
     where = parse_where("moisture=wet,d50<19", ("d50", "moisture"))
     (line,) = next_steps(tmp_path, [], matrix("rows"), where, is_simulated=False)
     assert line == "Next, as the rows stand: t10w b10w r10w"
@@ -100,23 +100,23 @@ def test_only_what_was_asked_for_is_suggested(tmp_path):
     assert next_steps(tmp_path, [], matrix("rows"), none, is_simulated=False) == []
 
 
-def test_rows_come_as_they_stand():
+def test_rows_are_suggested_in_the_order_of_the_matrix():
     assert suggest_order(matrix("rows"), []) == NAMES
     assert suggest_order(matrix("rows"), ["t10d"]) == NAMES[1:]
 
 
-def test_the_seed_decides_the_order_and_what_is_recorded_leaves_it():
+def test_the_seed_decides_the_order_and_recorded_rows_are_left_out():
     order = suggest_order(matrix(seed=1), [])
     assert sorted(order) == sorted(NAMES)
     assert order != NAMES
     assert suggest_order(matrix(seed=1), []) == order
     assert suggest_order(matrix(seed=2), []) != order
     done = [order[3], order[0], "not of this matrix"]
-    rest = [name for name in order if name not in done]
-    assert suggest_order(matrix(seed=1), done) == rest
+    remaining = [name for name in order if name not in done]
+    assert suggest_order(matrix(seed=1), done) == remaining
 
 
-def test_blocks_are_done_in_one_go():
+def test_blocks_are_not_interleaved():
     blocked = matrix("blocked", block_by=("foot",))
     order = suggest_order(blocked, [])
     feet = [name[0] for name in order]
@@ -127,7 +127,7 @@ def test_blocks_are_done_in_one_go():
     assert order != sorted(order)
 
 
-def test_cells_come_again_when_all_were_recorded():
+def test_cells_are_repeated_once_all_are_recorded():
     twice = matrix(repeat_blocks=1)
     assert len(suggest_order(twice, NAMES[:-1])) == 1
     again = suggest_order(twice, NAMES)

@@ -1,4 +1,4 @@
-"""Each thing that may be wrong with the files of a session, and who tells of it.
+"""Every kind of damage to the files of a session is reported.
 
 A small session of two kept trials and a rejected one, damaged in one way at a time.
 """
@@ -56,11 +56,11 @@ def drop(name):
 
 
 def replace(name, old, new):
-    def spoil(session):
+    def damage(session):
         path = session.path / name
         path.write_bytes(path.read_bytes().replace(old, new, 1))
 
-    return spoil
+    return damage
 
 
 def cut_lines(count):
@@ -68,11 +68,11 @@ def cut_lines(count):
 
 
 def lose_line(number):
-    def spoil(session):
+    def damage(session):
         every = lines(session)
         write_lines(session, every[: number - 1] + every[number:])
 
-    return spoil
+    return damage
 
 
 def set_json(name, **fields):
@@ -80,13 +80,13 @@ def set_json(name, **fields):
 
 
 def flip(name):
-    def spoil(session):
+    def damage(session):
         path = session.path / name
         content = bytearray(path.read_bytes())
         content[len(content) // 2] ^= 1
         path.write_bytes(content)
 
-    return spoil
+    return damage
 
 
 def shorten(session):
@@ -95,7 +95,7 @@ def shorten(session):
 
 
 def add_trial(session):
-    """Add a kept trial that no journal knows, and spoil its recording."""
+    """Add a kept trial that is not in the journal, and damage its recording."""
     for suffix in (".json", ".mcap"):
         source = (session.path / "trials/T01.json").with_suffix(suffix)
         (session.path / "trials/T03").with_suffix(suffix).write_bytes(
@@ -111,8 +111,8 @@ def link_out(session):
     path.symlink_to(session.path.parent / "elsewhere.mcap")
 
 
-def say_recorded(session):
-    """Let the journal's first line be of a recorded session of another terrain."""
+def name_another_terrain(session):
+    """Make the first line of the journal name another terrain."""
     first, *rest = lines(session)
     event = {k: v for k, v in parse_line(first).items() if k not in {"line", "crc"}}
     write_lines(session, [journal_line({**event, "terrain": "S0"}, 1), *rest])
@@ -148,11 +148,11 @@ DAMAGES = {
         drop("session.json"),
         {("session.json", "is missing or damaged")},
     ),
-    "summary of another": (
+    "summary of another session": (
         set_json("session.json", id="S007"),
         {("session.json", "is of S007: a copy, or a renamed session")},
     ),
-    "summary knows more": (
+    "summary with an extra trial": (
         set_json("session.json", kept=["T01", "T02", "T04"]),
         {("trials/T04.mcap", "is kept in session.json, not in the journal")},
     ),
@@ -160,25 +160,28 @@ DAMAGES = {
         drop("trials/T01.json"),
         {("trials/T01.json", "is missing or unreadable")},
     ),
-    "sidecar of other bytes": (
+    "sidecar with another checksum": (
         set_json("trials/T01.json", sha256="0" * 64),
         {("trials/T01.json", "states another checksum")},
     ),
     "recording gone": (drop("trials/T01.mcap"), {("trials/T01.mcap", "is missing")}),
-    "bit of a recording": (flip("trials/T02.mcap"), {("trials/T02.mcap", CHECKSUM)}),
+    "bit flipped in a recording": (
+        flip("trials/T02.mcap"),
+        {("trials/T02.mcap", CHECKSUM)},
+    ),
     "recording cut": (
         shorten,
         {("trials/T01.mcap", f"is changed: {SIZE - 100} bytes, {SIZE} were kept")},
     ),
-    "trial of no journal": (
+    "trial unknown to the journal": (
         add_trial,
         {
             ("trials/T03.json", "is kept, but is not in the journal"),
             ("trials/T03.mcap", CHECKSUM),
         },
     ),
-    "another terrain inside": (
-        say_recorded,
+    "another terrain in the journal": (
+        name_another_terrain,
         {("events.jsonl", "is of S0: a renamed session")},
     ),
 }
@@ -189,22 +192,22 @@ def test_a_sound_session_has_no_deviation(session):
 
 
 @pytest.mark.parametrize("name", DAMAGES)
-def test_a_damage_is_named(session, name):
-    spoil, wanted = DAMAGES[name]
-    spoil(session)
-    found = deviations(session)
-    assert wanted <= found
-    others = {problem for file, problem in found - wanted if file != "events.jsonl"}
+def test_every_damage_is_named(session, name):
+    damage, wanted = DAMAGES[name]
+    damage(session)
+    reported = deviations(session)
+    assert wanted <= reported
+    others = {problem for file, problem in reported - wanted if file != "events.jsonl"}
     missing = "is kept, but is not in the journal"
     assert others <= {missing, "is kept in session.json, not in the journal"}
 
 
-def test_a_recording_that_leads_elsewhere_is_named(session):
+def test_a_recording_that_is_a_link_is_named(session):
     link_out(session)
     assert {d.file for d in compare_kept(session)} == {"trials/T01.mcap"}
 
 
-def test_a_journal_of_two_lines_needs_its_summary(session):
+def test_a_missing_session_json_is_named_from_the_second_event_on(session):
     write_lines(session, lines(session)[:2])
     drop("session.json")(session)
     assert ("session.json", "is missing or damaged") in deviations(session)
@@ -213,14 +216,16 @@ def test_a_journal_of_two_lines_needs_its_summary(session):
 
 
 @pytest.mark.parametrize("fields", [{"kept": ["T01"]}, {"events": 12}])
-def test_an_empty_journal_is_missed_by_whatever_the_summary_says(session, fields):
+def test_an_empty_journal_is_named_if_session_json_has_events_or_trials(
+    session, fields
+):
     write_lines(session, [])
     (session.path / "session.json").write_text(json.dumps({"id": "S001", **fields}))
     missing = ("events.jsonl", "is missing or empty; session.json is not")
     assert missing in deviations(session)
 
 
-def test_a_kept_file_of_another_name_is_named_and_not_counted(session):
+def test_a_sidecar_with_an_invalid_name_is_named(session):
     sidecar = json.loads((session.path / "trials/T01.json").read_text())
     (session.path / "trials/Tab.json").write_text(json.dumps(sidecar))
     assert deviations(session) == {
@@ -252,8 +257,8 @@ def test_a_name_that_contradicts_the_journal_is_named(data, session, name):
 
 
 @pytest.mark.parametrize(("mark", "kind"), [("", "simulated"), (".fake", "recorded")])
-def test_a_summary_of_the_other_kind_is_named(session, mark, kind):
-    """A journal of which the first line does not say it leaves session.json."""
+def test_a_session_json_of_the_other_kind_is_named(session, mark, kind):
+    """Where the journal does not state the kind of session, session.json does."""
     folder = session.path.rename(session.path.with_name(f"2027-01-15_S001_TF{mark}"))
     change_json(folder / "session.json", simulated=kind == "simulated")
     renamed = find_session(folder.parents[1], "S001")
@@ -261,7 +266,7 @@ def test_a_summary_of_the_other_kind_is_named(session, mark, kind):
     assert wanted in deviations(renamed)
 
 
-def test_a_trial_whose_files_follow_the_journal_later_is_no_deviation(session):
+def test_files_not_yet_moved_to_match_the_journal_are_no_deviation(session):
     """A verdict is in the journal before the files are moved."""
     for suffix in (".json", ".mcap"):
         kept = session.path / f"trials/T01{suffix}"
@@ -269,23 +274,23 @@ def test_a_trial_whose_files_follow_the_journal_later_is_no_deviation(session):
     assert deviations(session) == set()
 
 
-def test_what_is_asked_of_one_trial_is_that_trial(session):
+def test_the_comparison_of_one_trial_ignores_the_others(session):
     flip("trials/T02.mcap")(session)
     assert compare_trial(session, session.path / "trials/T01.mcap") == []
-    (found,) = compare_trial(session, session.path / "trials/T02.mcap")
-    assert found.text() == f"S001 trials/T02.mcap {CHECKSUM}"
+    (reported,) = compare_trial(session, session.path / "trials/T02.mcap")
+    assert reported.text() == f"S001 trials/T02.mcap {CHECKSUM}"
 
 
 def test_deviations_are_refused_unless_they_are_allowed(session):
     assert check_kept([session], allow_missing=False) == []
     drop("trials/T01.mcap")(session)
-    (found,) = check_kept([session], allow_missing=True)
-    assert found.problem == "is missing"
+    (reported,) = check_kept([session], allow_missing=True)
+    assert reported.problem == "is missing"
     with pytest.raises(KeptDataError, match=r"S001 trials/T01\.mcap is missing\."):
         check_kept([session], allow_missing=False)
 
 
-def test_no_more_than_six_deviations_are_named(session):
+def test_a_long_list_of_deviations_is_shortened(session):
     for number in range(3, 12):
         name = f"trials/T{number:02d}.json"
         content = json.loads((session.path / "trials/T01.json").read_text())
@@ -298,7 +303,7 @@ def test_no_more_than_six_deviations_are_named(session):
     assert "; and 12 more." in str(refusal.value)
 
 
-def test_the_second_folder_of_a_number_is_named_with_the_first(data, session):
+def test_a_repeated_session_number_is_reported_with_both_folders(data, session):
     copy = session.path.with_name("2027-01-16_S001_TF.fake")
     copy.mkdir()
     repeated = repeated_numbers(list_sessions(data))
@@ -307,7 +312,7 @@ def test_the_second_folder_of_a_number_is_named_with_the_first(data, session):
     ]
 
 
-def test_trials_of_a_copy_are_told_by_their_content(data, session):
+def test_trials_of_a_copied_session_are_recognised_by_checksum(data, session):
     copy = session.path.with_name("2027-01-15_S002_TF.fake")
     shutil.copytree(session.path, copy)
     events = find_session(data, "S002").events()
@@ -319,7 +324,7 @@ def test_trials_of_a_copy_are_told_by_their_content(data, session):
     assert repeated_trials(find_session(data, "S002"), session) == {"T01"}
 
 
-def test_checksums_are_computed_by_whom_is_asked(session):
+def test_kept_trials_are_hashed_by_the_given_function(session):
     asked = []
 
     def digest(path):
@@ -335,5 +340,5 @@ def test_a_folder_that_cannot_be_read_is_a_deviation(session):
     (session.path / "trials").symlink_to(session.path / "old")
     with pytest.raises(TrialFileError):
         session.journal_text()
-    (found,) = compare_kept(session)
-    assert found.file == "trials"
+    (reported,) = compare_kept(session)
+    assert reported.file == "trials"
