@@ -125,7 +125,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             ("torque-limit", *_DEAD, *_REVERSED),
             "",
             (
-                "tests/experiments/run/test_tare.py::test_a_wrong_mass_of_the_foot_shows_as_its_weight",
+                "tests/experiments/run/test_tare.py::test_a_wrong_mass_of_the_foot_shows_as_a_residual_force",
             ),
         ),
         "implausible": (
@@ -270,7 +270,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (
                 _MATRIX,
                 "tests/ft_sensor/vendors/test_sensor_contract.py::test_one_frozen_reading_is_invalid_until_it_changes",
-                "tests/experiments/run/test_quality.py::test_a_frozen_channel_is_named_and_nothing_of_the_sensor_is_ticked",
+                "tests/experiments/run/test_quality.py::test_a_frozen_channel_is_named_and_the_sensor_is_not_ticked",
             ),
         ),
         "drifting": (
@@ -876,7 +876,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "1 N",
             (
-                "tests/experiments/run/test_tare.py::test_a_wrong_mass_of_the_foot_shows_as_its_weight",
+                "tests/experiments/run/test_tare.py::test_a_wrong_mass_of_the_foot_shows_as_a_residual_force",
             ),
         ),
         "implausible": (

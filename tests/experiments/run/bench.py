@@ -23,7 +23,7 @@ from fakes.clock import SteppedClock
 
 @dataclass
 class StubClient:
-    """A loop in which nothing happens unless the test says so."""
+    """Loop in which only that happens which the test sets."""
 
     clock: SteppedClock
     status: ControlStatus = field(default_factory=ControlStatus)
@@ -64,7 +64,7 @@ class StubClient:
 
 
 class Keys:
-    """An operator who presses the given keys, one per look, then nothing."""
+    """Operator who presses the given keys, one per look, then nothing."""
 
     draft = ""
     who = "mk"
@@ -83,7 +83,7 @@ class Keys:
 
 
 class StubBackend:
-    """A backend that is safe at once."""
+    """Backend that is idle at once."""
 
     def __init__(self, client):
         self.loop_client = client
@@ -101,7 +101,7 @@ class StubBackend:
 
 
 def make_loop(operator, *, is_stepped=True, console=None, wall=None, **more):
-    """Return a console loop over a rig without devices; `wall` paces a person's."""
+    """Console loop over a rig without devices; `wall` paces it as for a person."""
     clock = SteppedClock()
     rig = SimpleNamespace(
         clock=clock,
@@ -117,8 +117,8 @@ def make_loop(operator, *, is_stepped=True, console=None, wall=None, **more):
     return ConsoleLoop(rig, console or Console(), operator, StopFlag(), **more)
 
 
-def said(work):
-    """Return what `work` prints."""
+def printed_by(work):
+    """Text that `work` prints."""
     out = io.StringIO()
     with redirect_stdout(out):
         work()
@@ -126,7 +126,7 @@ def said(work):
 
 
 def make_context(data, operator, *, trials=2, **more):
-    """Return the context of a session in `data` that waits for its first trial."""
+    """Context of a session in `data` that waits for its first trial."""
     loop = make_loop(operator, **more)
     folder = create_session(data, "TF", is_simulated=True, utc_ns=0)
     journal = Journal(folder, loop.rig.clock)

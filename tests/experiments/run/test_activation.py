@@ -1,4 +1,4 @@
-"""The way from braked to active: torques first, then the pendant and [space]."""
+"""From idle to active: torques first, then the pendant and [space]."""
 
 import pytest
 
@@ -16,7 +16,7 @@ ALL = 0x7F
 
 
 class Pendant(Keys):
-    """A person who activates the arm at one look and presses keys at others."""
+    """Operator who activates the arm at one look and presses keys at others."""
 
     def __init__(self, loop_status, keys, active_at):
         super().__init__()
@@ -31,7 +31,7 @@ class Pendant(Keys):
 
 
 def bench(*, keys=(), active_at=None, fresh=ALL, state=ArmState.HOLD):
-    """Return a console loop whose arm answers with the motors `fresh`."""
+    """Console loop whose arm has fresh replies of the motors in the mask `fresh`."""
     loop = make_loop(Keys())
     client = loop.loop_client
     loop.operator = Pendant(client.status, dict(keys), active_at)
@@ -53,7 +53,7 @@ def looks(loop):
     return len(loop.operator.states)
 
 
-def test_hold_is_asked_for_before_the_pendant():
+def test_hold_is_requested_before_the_pendant():
     loop = bench(keys={0: " "}, active_at=0)
     activate(loop)
     assert loop.loop_client.requested == [ArmState.HOLD]
@@ -69,19 +69,19 @@ def test_the_loop_gets_time_for_the_first_torques():
 
 
 @pytest.mark.parametrize(("space", "active", "needed"), [(4, 2, 5), (2, 4, 5)])
-def test_space_and_the_pendant_are_both_waited_for(space, active, needed):
+def test_activation_needs_both_space_and_the_pendant(space, active, needed):
     loop = bench(keys={space: " "}, active_at=active)
     activate(loop)
     assert looks(loop) == needed
 
 
-def test_another_key_is_no_space():
+def test_another_key_does_not_replace_space():
     loop = bench(keys={0: "x", 7: " "}, active_at=0)
     activate(loop)
     assert looks(loop) == 8
 
 
-def test_an_arm_that_is_not_activated_is_given_up_after_two_minutes():
+def test_activation_times_out_without_the_pendant():
     loop = bench(keys={0: " "})
     with pytest.raises(PreflightError) as refused:
         activate(loop)
@@ -89,7 +89,7 @@ def test_an_arm_that_is_not_activated_is_given_up_after_two_minutes():
     assert loop.loop_client.advanced == pytest.approx(PATIENCE + 0.1, abs=0.05)
 
 
-def test_an_active_arm_without_space_is_not_supported():
+def test_activation_times_out_without_space():
     with pytest.raises(PreflightError):
         activate(bench(active_at=0))
 
@@ -98,7 +98,7 @@ def test_an_active_arm_without_space_is_not_supported():
     ("silent", "named"),
     [(0b0000100, "Puck 3 has"), (0b1000001, "Pucks 1,7 have")],
 )
-def test_without_torques_the_pendant_is_not_asked_for(silent, named):
+def test_silent_pucks_are_named_before_the_pendant_is_asked_for(silent, named):
     loop = bench(fresh=ALL & ~silent, state=ArmState.IDLE)
     with pytest.raises(PreflightError) as refused:
         activate(loop)
@@ -123,7 +123,7 @@ def test_a_pressed_stop_is_named_instead_of_the_pucks():
     assert "E-stop" in refused.value.message
 
 
-def test_a_verdict_while_torques_are_made_ready_is_reported_as_such():
+def test_a_guard_verdict_during_activation_is_reported():
     loop = bench(state=ArmState.IDLE)
     verdict = GuardVerdict(Action.IDLE, Fault.E_STOP)
     loop.loop_client.status.verdict = verdict
@@ -132,7 +132,7 @@ def test_a_verdict_while_torques_are_made_ready_is_reported_as_such():
     assert fault.value.verdict is verdict
 
 
-def test_a_fault_that_stands_is_reported_before_anything_is_asked_for():
+def test_a_latched_fault_is_reported_before_hold_is_requested():
     loop = bench(keys={0: " "}, active_at=0)
     loop.loop_client.status.latch(GuardVerdict(Action.IDLE, Fault.E_STOP))
     with pytest.raises(ArmFaultError):

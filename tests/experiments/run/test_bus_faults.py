@@ -22,8 +22,8 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 AFTER = 0.2  # s into the recording
 ALL_FRESH = 0x7F << MOTOR_FRESH_SHIFT
 
-# name: (what the message begins with, what it says of the arm, the last line,
-#        the true mode at the end)
+# name: (start of the message, state of the arm in it, last line printed,
+#        true mode at the end)
 BRAKED, UNKNOWN = (
     "ARM: idle; it sinks slowly, support it.",
     "ARM: UNKNOWN - support it.",
@@ -76,13 +76,13 @@ ENDINGS = {
         E_STOP,
     ),
 }
-# Nobody says what puck 3 measures from these faults on.
+# Puck 3 sends no replies after these faults.
 SILENT = {"puck-silent", "puck-reboot", "can-silence", "bus-off"}
 SILENT |= {"interface-down", "unacknowledged"}
 
 
 def hurry(asked):
-    """Press the keys of a short session; None leaves it to AutoOperator."""
+    """Key of a short session; None leaves the prompt to AutoOperator."""
     if asked.prompt is Prompt.READY:
         return " " if asked.since > 0.1 else ""
     return None
@@ -90,7 +90,7 @@ def hurry(asked):
 
 @pytest.fixture(scope="module", params=sorted(ENDINGS))
 def ended(request, tmp_path_factory, config):
-    """Return (name, session) of a fault that ends the session in its first trial."""
+    """(name, session) of a fault that ends the session in its first trial."""
     data = tmp_path_factory.mktemp(request.param)
     fault = f"{request.param}@T1+{AFTER}s"
     seen = run_watched(
@@ -99,7 +99,7 @@ def ended(request, tmp_path_factory, config):
     return request.param, seen
 
 
-def test_a_fault_of_the_bus_is_told_with_the_arm_and_what_to_do(ended):
+def test_a_bus_fault_is_reported_with_arm_state_and_safe_trials(ended):
     name, seen = ended
     begin, arm, last, _ = ENDINGS[name]
     (line,) = seen.done.err.splitlines()
@@ -109,7 +109,7 @@ def test_a_fault_of_the_bus_is_told_with_the_arm_and_what_to_do(ended):
     assert seen.done.out.splitlines()[-2] == last
 
 
-def test_a_fault_of_the_bus_ends_the_session_with_the_arm_at_rest(ended):
+def test_a_bus_fault_ends_the_session_with_the_arm_braked(ended):
     name, seen = ended
     assert seen.done.code == 4
     assert seen.rig.network.safety_mode is ENDINGS[name][3]
@@ -117,7 +117,7 @@ def test_a_fault_of_the_bus_ends_the_session_with_the_arm_at_rest(ended):
     assert seen.rig.plant.is_idle  # all windings are shorted
 
 
-def test_the_trial_is_kept_as_interrupted(ended):
+def test_the_interrupted_trial_is_rejected_with_a_sound_recording(ended):
     _, seen = ended
     path = seen.folder / "rejected" / "T01a.mcap"
     fields = sidecar(path)
@@ -137,7 +137,7 @@ def test_the_flight_record_shows_the_bus_before_the_fault(ended):
     cycles = TrialReader(path).cycles().data
     is_whole = (cycles["flags"] & ALL_FRESH) == ALL_FRESH
     assert is_whole[:500].all()
-    # A second of replies, one for each question, before the first cycle without one.
+    # A second of replies, one per request, before the first cycle without one.
     host_ns = cycles["host_ns"].astype(np.int64)
     fault_ns = host_ns[-1 if is_whole.all() else int(np.argmin(is_whole))]
     second = (host_ns > fault_ns - 1_000_000_000) & (host_ns <= fault_ns)
@@ -149,7 +149,7 @@ def test_the_flight_record_shows_the_bus_before_the_fault(ended):
         assert not (replies & (times > fault_ns)).any()
 
 
-def test_torques_stop_with_the_replies_and_only_braking_follows(ended):
+def test_no_new_torque_follows_the_fault(ended):
     name, seen = ended
     cycles = TrialReader(seen.folder / "faults" / "T01a.flight.mcap").cycles().data
     torque, flags = cycles["torque_command"], cycles["flags"]
@@ -166,7 +166,7 @@ def test_torques_stop_with_the_replies_and_only_braking_follows(ended):
 
 @pytest.fixture(scope="module", params=["reply-swapped", "bus-flooded"])
 def endured(request, tmp_path_factory, config):
-    """Return (name, session) of a fault that the trial lives through."""
+    """(name, session) of a fault that the trial survives."""
     data = tmp_path_factory.mktemp(request.param)
     fault = f"{request.param}@T1+{AFTER}s"
     return request.param, run_watched(config, data, 1, "--fault", fault)
@@ -179,7 +179,7 @@ def test_swapped_replies_and_foreign_traffic_do_not_stop_a_trial(endured):
     assert (sidecar(path)["verdict"], sidecar(path)["status"]) == ("keep", "complete")
 
 
-def test_incomplete_cycles_are_rare_single_and_marked(endured):
+def test_incomplete_cycles_are_rare_isolated_and_flagged(endured):
     name, seen = endured
     cycles = TrialReader(seen.folder / "trials" / "T01.mcap").cycles().data
     lacking = (cycles["flags"] & ALL_FRESH) != ALL_FRESH
@@ -188,12 +188,12 @@ def test_incomplete_cycles_are_rare_single_and_marked(endured):
     assert lacking[begun:].mean() == pytest.approx(late, abs=0.001)
     assert not (lacking[1:] & lacking[:-1]).any()
     # The push is smooth to four counts of joint 4, 3.4e-4 rad, which moves 5e-4 in
-    # a cycle, so a position of the cycle before would show twice that.
+    # a cycle; a stale position would show twice that.
     kinks = np.abs(np.diff(cycles["position"], n=2, axis=0))
     assert kinks.max() < 5e-4
 
 
-def test_what_the_link_lost_is_written_into_the_trial(endured):
+def test_lost_replies_are_counted_in_the_trial(endured):
     name, seen = endured
     path = seen.folder / "trials" / "T01.mcap"
     texts = [bytes(payload) for _, payload in messages_of(path)["/events"]]
@@ -210,7 +210,7 @@ def test_what_the_link_lost_is_written_into_the_trial(endured):
         ("puck-error", "33-35 °C, puck 3 reports error 7"),
     ],
 )
-def test_an_ill_puck_is_named_at_the_preflight(config, tmp_path, fault, text):
+def test_a_faulty_puck_is_named_at_the_preflight(config, tmp_path, fault, text):
     def quit_at_once(asked, rig):
         return "q" if asked.prompt is Prompt.SUPPORT else None
 
@@ -225,7 +225,7 @@ def test_an_ill_puck_is_named_at_the_preflight(config, tmp_path, fault, text):
 
 
 def stop_at(prompt, then=None):
-    """Return a `press` that hits the stop button at `prompt` and presses `then`."""
+    """A `press` that hits the stop button at `prompt` and presses `then`."""
     done = []
 
     def press(asked, rig):
@@ -241,7 +241,9 @@ def stop_at(prompt, then=None):
     return press
 
 
-def test_a_stop_before_the_preflight_refuses_and_touches_nothing(config, tmp_path):
+def test_a_stop_before_the_preflight_refuses_the_run_and_creates_no_data(
+    config, tmp_path
+):
     data = tmp_path / "data"
     done = run_short(config, data, "TF", 1, "--fault", "estop@T0+0s")
     assert done.code == 3
@@ -264,7 +266,7 @@ def test_a_stop_between_trials_ends_the_session_without_power(config, tmp_path, 
     assert ("T01a.mcap" in rejected) is (prompt is Prompt.REVIEW)
 
 
-def test_a_stop_at_the_last_key_costs_nothing(config, tmp_path):
+def test_a_stop_at_the_last_key_keeps_the_trial(config, tmp_path):
     seen = run_watched(config, tmp_path, 1, press=stop_at(Prompt.REVIEW, then="k"))
     assert (seen.done.code, seen.done.err) == (0, "")
     assert sidecar(seen.folder / "trials" / "T01.mcap")["verdict"] == "keep"

@@ -16,7 +16,7 @@ from experiments.run.console_loop import TICK
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session.sidecar import TrialName
 from fakes.clock import SteppedClock
-from tests.experiments.run.bench import Keys, make_loop, said
+from tests.experiments.run.bench import Keys, make_loop, printed_by
 
 NAME = TrialName(3, 2)
 STANDING = verdict_for(Fault.CONSOLE_LOST)
@@ -24,13 +24,13 @@ MILD = verdict_for(Fault.CONSOLE_SILENT)
 WORSE = verdict_for(Fault.E_STOP, CircuitCauses())
 
 
-def test_a_tick_lets_20_ms_pass_and_returns_the_key():
+def test_a_tick_advances_by_one_period_and_returns_the_key():
     loop = make_loop(Keys("n"))
     assert loop.tick(Prompt.READY, NAME) == "n"
     assert loop.loop_client.advanced == pytest.approx(TICK)
 
 
-def test_the_operator_sees_trial_and_attempt_and_since_when_it_is_asked():
+def test_the_operator_sees_trial_attempt_and_age_of_the_prompt():
     operator = Keys()
     loop = make_loop(operator)
     for prompt in (Prompt.LIFT, Prompt.LIFT, Prompt.READY):
@@ -58,13 +58,13 @@ def test_a_stop_ends_every_prompt_but_the_review():
         loop.tick(Prompt.READY)
 
 
-def test_a_stop_gives_a_note_up():
+def test_a_stop_abandons_a_note():
     loop = make_loop(Keys(lines=["half a no"]))
     loop.stop.request()
     assert loop.line(NAME) == ""
 
 
-def test_a_terminal_that_is_lost_is_a_stop():
+def test_a_lost_terminal_is_a_stop():
     loop = make_loop(Keys())
     loop.console.is_lost = True
     with pytest.raises(StopRequestedError):
@@ -83,7 +83,7 @@ def test_a_fault_that_persists_is_raised_once_where_the_arm_rests(prompt):
         loop.tick(prompt)
 
 
-def test_a_fault_that_was_gone_is_raised_again():
+def test_a_fault_that_returns_is_raised_again():
     loop = make_loop(Keys())
     for verdict in (STANDING, STANDING):
         loop.loop_client.status.verdict = verdict
@@ -93,7 +93,7 @@ def test_a_fault_that_was_gone_is_raised_again():
         loop.tick(Prompt.REVIEW)
 
 
-def test_a_fault_is_raised_at_every_tick_where_the_arm_is_wanted():
+def test_a_fault_is_raised_at_every_tick_while_recording():
     loop = make_loop(Keys())
     loop.loop_client.status.verdict = STANDING
     for _ in range(2):
@@ -111,20 +111,20 @@ def test_the_worst_verdict_is_the_newest_only_if_it_is_more_severe():
     assert loop.worst_verdict(WORSE) is WORSE
 
 
-def test_a_fault_beside_a_stricter_one_is_told_once():
+def test_a_fault_followed_by_a_stricter_one_is_reported_once():
     loop = make_loop(Keys())
     loop.loop_client.status.latch(MILD)
     with pytest.raises(ArmFaultError) as raised:
         loop.tick(Prompt.REVIEW)
     assert raised.value.verdict is MILD
     loop.loop_client.status.latch(WORSE)
-    words = said(lambda: loop.worst_verdict(MILD))
+    words = printed_by(lambda: loop.worst_verdict(MILD))
     assert words.count("No heartbeat from the console for 0.5 s.") == 1
     assert "Stop pressed" not in words
-    assert said(lambda: loop.tick(Prompt.REVIEW)) == ""
+    assert printed_by(lambda: loop.tick(Prompt.REVIEW)) == ""
 
 
-def test_what_stands_is_known_to_the_loop_once_it_is_raised():
+def test_a_raised_fault_is_noted_as_known():
     loop = make_loop(Keys())
     loop.loop_client.status.latch(MILD)
     assert loop.loop_client.known == 0
@@ -133,7 +133,7 @@ def test_what_stands_is_known_to_the_loop_once_it_is_raised():
     assert loop.loop_client.known == 1
 
 
-def test_the_heartbeat_goes_on_while_something_slow_is_done():
+def test_the_loop_advances_during_background_work():
     loop = make_loop(Keys(), is_stepped=False)
 
     def work():
@@ -146,14 +146,14 @@ def test_the_heartbeat_goes_on_while_something_slow_is_done():
     assert loop.loop_client.advanced >= 3 * TICK
 
 
-def test_on_stepped_time_no_time_passes_while_something_slow_is_done():
+def test_stepped_time_stands_still_during_background_work():
     loop = make_loop(Keys())
     assert loop.run_in_background(lambda: 7) == 7
     assert loop.loop_client.advanced == 0.0
 
 
 @pytest.mark.parametrize("is_stepped", [True, False])
-def test_what_slow_work_raises_is_raised(is_stepped):
+def test_an_error_of_background_work_is_raised(is_stepped):
     def work():
         raise SessionError("no")
 
@@ -163,7 +163,7 @@ def test_what_slow_work_raises_is_raised(is_stepped):
 
 @pytest.fixture
 def keyboard():
-    """Yield the two ends of what a person types on."""
+    """The two ends of the pipe that a person types into."""
     reads, writes = os.pipe()
     yield reads, writes
     os.close(reads)
@@ -171,7 +171,7 @@ def keyboard():
 
 
 def waited(loop, prompt, seconds):
-    """Let a prompt wait for `seconds`; return how many passed in the world."""
+    """Let a prompt wait for `seconds`; the seconds that passed in the simulation."""
     before = loop.loop_client.advanced
     for _ in range(round(seconds / TICK)):
         loop.tick(prompt)
@@ -179,7 +179,7 @@ def waited(loop, prompt, seconds):
 
 
 @pytest.mark.parametrize("prompt", [Prompt.SUPPORT, Prompt.READY, Prompt.REVIEW])
-def test_a_simulated_world_rests_while_a_person_reads(keyboard, prompt):
+def test_the_simulation_pauses_while_a_person_reads(keyboard, prompt):
     wall = SteppedClock()
     loop = make_loop(TerminalInput(keyboard[0]), wall=wall)
     assert waited(loop, prompt, 1.9) == pytest.approx(1.9)
@@ -189,7 +189,7 @@ def test_a_simulated_world_rests_while_a_person_reads(keyboard, prompt):
     assert passed + loop.loop_client.advanced - before == pytest.approx(60.0)
 
 
-def test_a_key_wakes_a_world_at_rest(keyboard):
+def test_a_key_resumes_a_paused_simulation(keyboard):
     loop = make_loop(TerminalInput(keyboard[0]), wall=SteppedClock())
     waited(loop, Prompt.READY, 60.0)
     os.write(keyboard[1], b"n")
@@ -197,7 +197,7 @@ def test_a_key_wakes_a_world_at_rest(keyboard):
     assert waited(loop, Prompt.READY, 1.9) == pytest.approx(1.9)
 
 
-def test_a_world_whose_hand_is_on_its_way_does_not_rest(keyboard):
+def test_the_simulation_does_not_pause_while_the_hand_moves(keyboard):
     loop = make_loop(TerminalInput(keyboard[0]), wall=SteppedClock())
     loop.rig.simulation = SimpleNamespace(is_hand_done=False)
     assert waited(loop, Prompt.TOUCH, 60.0) == pytest.approx(60.0)
@@ -208,17 +208,17 @@ def test_a_world_whose_hand_is_on_its_way_does_not_rest(keyboard):
 @pytest.mark.parametrize(
     "prompt", [Prompt.RECORDING, Prompt.MOVING, Prompt.LIFT, Prompt.UNDO]
 )
-def test_a_world_that_acts_does_not_rest(keyboard, prompt):
+def test_the_simulation_does_not_pause_at_prompts_with_motion(keyboard, prompt):
     loop = make_loop(TerminalInput(keyboard[0]), wall=SteppedClock())
     assert waited(loop, prompt, 60.0) == pytest.approx(60.0)
 
 
-def test_a_world_without_a_person_does_not_rest():
+def test_the_simulation_does_not_pause_without_a_person():
     loop = make_loop(Keys(), wall=SteppedClock())
     assert waited(loop, Prompt.READY, 60.0) == pytest.approx(60.0)
 
 
-def test_what_is_typed_of_a_note_is_shown_while_the_world_rests(keyboard):
+def test_a_note_is_shown_as_typed_in_a_paused_simulation(keyboard):
     shown = []
     console = SimpleNamespace(is_live=True, is_lost=False, width=80, panel=shown.append)
     loop = make_loop(TerminalInput(keyboard[0]), wall=SteppedClock(), console=console)

@@ -8,10 +8,10 @@ from tests.experiments.program import only_session, run_short, traction
 from tests.wam.driver.test_generations import DOCUMENTED
 
 SHORT = {min(DOCUMENTED), 60, 61, 250}
-QUESTION = {vers: "1A" if vers < 61 else "30" for vers in DOCUMENTED}
+REQUEST = {vers: "1A" if vers < 61 else "30" for vers in DOCUMENTED}
 
 
-# Those beside the great changes are the short form.
+# The default run has the generations next to the great changes.
 GENERATIONS = [
     pytest.param(vers, marks=() if vers in SHORT else pytest.mark.long)
     for vers in [*DOCUMENTED, 250]
@@ -30,7 +30,7 @@ def test_an_arm_of_every_generation_is_zeroed_and_records_a_trial(
     log = tmp_path / "bus.log"
     done = run_short(config, tmp_path, "TF", 1, "--can-log", log)
     assert done.code == 0, done.err
-    assert f" 404#{QUESTION.get(vers, '30')}\n" in log.read_text()
+    assert f" 404#{REQUEST.get(vers, '30')}\n" in log.read_text()
     options = ("--all", "--data", tmp_path, "--config", config)
     assert traction("verify", *options).code == 0
     trial = only_session(tmp_path) / "trials" / "T01.mcap"

@@ -27,14 +27,14 @@ def names(context):
 
 
 def reviewed(context):
-    """Let the first trial be recorded and wait for its verdict."""
+    """Record the first trial and leave it waiting for its verdict."""
     details = {"trial": 1, "attempt": 1}
     context.journal.append(Event.TRIAL_STARTED, **details)
     context.journal.append(Event.TRIAL_RECORDED, **details)
     return TrialOutcome("key", 3.0, 0.4)
 
 
-def test_a_trial_begins_with_space_and_not_with_a_key_that_means_nothing(tmp_path):
+def test_a_trial_begins_with_space_and_with_no_other_key(tmp_path):
     context = make_context(tmp_path, Keys("x", "k", "", " ", "n"))
     wait_ready(context, FIRST)
     assert context.operator.keys == ["n"]
@@ -43,13 +43,13 @@ def test_a_trial_begins_with_space_and_not_with_a_key_that_means_nothing(tmp_pat
 @pytest.mark.parametrize(
     ("keys", "ticked"), [("1", {1}), ("13", {1, 3}), ("131", {3}), ("1331", set())]
 )
-def test_a_digit_ticks_a_step_of_the_reset_or_takes_it_back(tmp_path, keys, ticked):
+def test_a_digit_ticks_or_unticks_a_step_of_the_reset(tmp_path, keys, ticked):
     context = make_context(tmp_path, Keys(*keys, " "))
     wait_ready(context, FIRST)
     assert ready_view(context).ticked == ticked
 
 
-def test_quit_lets_the_next_trial_be_the_last(tmp_path):
+def test_quit_makes_the_next_trial_the_last(tmp_path):
     context = make_context(tmp_path, Keys("q", " "))
     wait_ready(context, FIRST)
     assert context.state.is_last
@@ -61,7 +61,7 @@ def test_quit_twice_ends_at_once(tmp_path):
         wait_ready(context, FIRST)
 
 
-def test_the_thin_cell_is_shown(tmp_path, monkeypatch):
+def test_the_thinnest_cell_is_shown(tmp_path, monkeypatch):
     monkeypatch.setattr(ready, "thinnest_cell", lambda folder: "slowly")
     context = make_context(tmp_path, Keys())
     assert ready_view(context).thin == "slowly"
@@ -81,7 +81,7 @@ def test_there_is_nothing_to_view_before_the_first_trial(tmp_path, capsys):
     assert "no trial to look at" in capsys.readouterr().out
 
 
-def test_a_note_of_spaces_is_none(tmp_path):
+def test_a_blank_note_is_ignored(tmp_path):
     context = make_context(tmp_path, Keys(lines=["   "]))
     take_note(context, FIRST, is_on_trial=False)
     assert Event.NOTED not in names(context)
@@ -119,7 +119,7 @@ def test_a_rejected_trial_has_its_reason(tmp_path, digit):
     )
 
 
-def test_quit_at_the_review_asks_for_the_verdict_that_is_missing(tmp_path, capsys):
+def test_quit_at_the_review_asks_for_the_missing_verdict(tmp_path, capsys):
     context = make_context(tmp_path, Keys("q", "k"))
     ask_verdict(context, FIRST, reviewed(context))
     assert "T01 has no verdict yet" in capsys.readouterr().out
@@ -127,16 +127,16 @@ def test_quit_at_the_review_asks_for_the_verdict_that_is_missing(tmp_path, capsy
     assert context.state.is_last
 
 
-def test_quit_twice_at_the_review_says_how_the_trial_is_kept_after_all(
+def test_quit_twice_at_the_review_rejects_and_names_the_verdict_command(
     tmp_path, capsys
 ):
     context = make_context(tmp_path, Keys("q", "q"))
     with pytest.raises(StopRequestedError):
         ask_verdict(context, FIRST, reviewed(context))
     assert names(context)[-1] == Event.TRIAL_REJECTED
-    said = capsys.readouterr().out
-    assert "rejected/T01a.mcap" in said
-    assert "traction verdict" in said
+    out = capsys.readouterr().out
+    assert "rejected/T01a.mcap" in out
+    assert "traction verdict" in out
 
 
 def test_a_fault_during_the_review_leaves_the_verdict_to_the_operator(tmp_path, capsys):
@@ -148,7 +148,7 @@ def test_a_fault_during_the_review_leaves_the_verdict_to_the_operator(tmp_path, 
     assert "ARM: holding" in capsys.readouterr().err
 
 
-def test_a_fault_that_takes_the_arm_away_rejects_the_trial(tmp_path):
+def test_an_emergency_stop_during_the_review_rejects_the_trial(tmp_path):
     context = make_context(tmp_path, Keys())
     outcome = reviewed(context)
     context.loop_client.status.verdict = GuardVerdict(Action.IDLE, Fault.E_STOP)
@@ -171,12 +171,12 @@ def test_the_duration_is_estimated_once_with_the_first_kept_trial(tmp_path):
     assert context.state.estimate == estimate
 
 
-def test_the_heartbeat_goes_on_while_a_slow_disk_takes_the_journal(tmp_path):
+def test_the_loop_advances_while_a_slow_disk_writes_the_journal(tmp_path):
     context = make_context(tmp_path, Keys(), is_stepped=False)
     client, journal = context.loop_client, context.journal
 
     class SlowJournal:
-        """A journal that waits until the console has ticked three times."""
+        """Journal that waits until the console has ticked three times."""
 
         def append(self, event, **details):
             deadline = time.monotonic() + 5.0  # noqa: TID251 - of a thread
@@ -190,7 +190,7 @@ def test_the_heartbeat_goes_on_while_a_slow_disk_takes_the_journal(tmp_path):
     assert names(context)[-1] == Event.PAUSED
 
 
-def test_the_keys_of_a_note_and_what_was_noted_are_said(tmp_path, capsys):
+def test_a_note_prints_its_keys_and_its_text(tmp_path, capsys):
     context = make_context(tmp_path, Keys(lines=["wet"]))
     take_note(context, FIRST, is_on_trial=False)
     out = capsys.readouterr().out
@@ -198,21 +198,21 @@ def test_the_keys_of_a_note_and_what_was_noted_are_said(tmp_path, capsys):
     assert f"Noted on {context.metadata.folder.id}: wet" in out
 
 
-def test_a_note_between_two_trials_holds_the_arm_meanwhile(tmp_path):
+def test_a_note_between_two_trials_holds_the_arm(tmp_path):
     context = make_context(tmp_path, Keys("n", " ", lines=["wet"]))
     wait_ready(context, FIRST)
     assert context.loop_client.requested == [ArmState.HOLD, ArmState.FLOAT]
     assert Event.NOTED in names(context)
 
 
-def test_the_last_kept_trial_is_viewed_before_there_is_a_new_one(
+def test_the_last_kept_trial_is_viewed_before_a_new_one_exists(
     tmp_path, capsys, monkeypatch
 ):
     context = make_context(tmp_path, Keys("v", " "), trials=4)
     for number in (1, 2, 3):
         for event in (Event.TRIAL_STARTED, Event.TRIAL_RECORDED, Event.TRIAL_KEPT):
             context.journal.append(event, trial=number, attempt=1)
-    (context.metadata.folder.trials / "T04.mcap").touch()  # of no verdict
+    (context.metadata.folder.trials / "T04.mcap").touch()  # without a verdict
     lines = SimpleNamespace(lines=lambda: [("✓", "sound")])
     reviewed_paths = []
     monkeypatch.setattr(
@@ -230,7 +230,7 @@ def test_the_newest_page_is_viewed_again(tmp_path, capsys):
     assert capsys.readouterr().out.count("T01 was fine") == 2
 
 
-def test_a_live_screen_stays_and_is_gone_with_the_trial(tmp_path, monkeypatch):
+def test_a_live_screen_ends_when_the_trial_begins(tmp_path, monkeypatch):
     context = make_context(tmp_path, Keys("", " "))
     panels, ends = [], []
     monkeypatch.setattr(context.console, "is_live", True)
@@ -251,7 +251,7 @@ def test_without_a_terminal_the_screen_is_printed_line_by_line(tmp_path, capsys)
     assert f"of {ready_view(context).wanted}" in out
 
 
-def test_a_note_is_seen_while_it_is_typed(tmp_path, monkeypatch):
+def test_a_note_is_shown_while_it_is_typed(tmp_path, monkeypatch):
     context = make_context(tmp_path, Keys(lines=[None, "wet"]))
     context.operator.draft = "we"
     panels = []

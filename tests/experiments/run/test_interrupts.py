@@ -1,4 +1,4 @@
-"""Ctrl-C once and twice in every phase in which a session can be."""
+"""Ctrl-C, once and twice, ends every phase of a session with the arm at rest."""
 
 import signal
 from dataclasses import dataclass
@@ -22,14 +22,14 @@ pytestmark = pytest.mark.slow
 
 @dataclass(frozen=True)
 class Moment:
-    """When Ctrl-C comes, and what the session is in the end.
+    """When Ctrl-C comes, and how the session ends.
 
     Attributes:
-        prompt: what the person is asked for then.
-        phase: of the session, as the journal has it.
+        prompt: prompt at which Ctrl-C comes.
+        phase: phase of the session in the journal at that moment.
         code: exit code.
-        end: phase that the session is left in.
-        rejected: attempts that count for nothing.
+        end: phase of the session afterwards.
+        rejected: number of rejected attempts.
         trial: number of the trial; 0 is the tare at the end.
     """
 
@@ -51,16 +51,16 @@ MOMENTS = [
     Moment(Prompt.REVIEW, SessionPhase.REVIEW, rejected=1),
     Moment(Prompt.LIFT, SessionPhase.READY, 0, SessionPhase.COMPLETE, trial=0),
 ]
-_ON_THE_WAY = {Prompt.NOTE: "n", Prompt.PAUSED: "p"}
+_KEY_TO_PROMPT = {Prompt.NOTE: "n", Prompt.PAUSED: "p"}
 
 
 def interrupt(moment, times, seen):
-    """Return a `press` that raises Ctrl-C and notes the phase that it came in."""
+    """A `press` that raises Ctrl-C and records the phase of that moment."""
     hit = []
 
     def press(asked, rig):
-        is_it = (asked.prompt, asked.trial) == (moment.prompt, moment.trial)
-        if is_it and not hit:
+        is_moment = (asked.prompt, asked.trial) == (moment.prompt, moment.trial)
+        if is_moment and not hit:
             if asked.since <= 0.05:
                 return ""
             hit.append(True)
@@ -69,7 +69,7 @@ def interrupt(moment, times, seen):
                 signal.raise_signal(signal.SIGINT)
             return ""
         if asked.prompt is Prompt.READY:
-            return _ON_THE_WAY.get(moment.prompt, " ") if asked.since > 0.05 else ""
+            return _KEY_TO_PROMPT.get(moment.prompt, " ") if asked.since > 0.05 else ""
         if asked.prompt is Prompt.RECORDING:
             return " " if asked.since > 0.2 else ""
         if asked.prompt is Prompt.REVIEW:
@@ -93,7 +93,7 @@ def test_ctrl_c_ends_every_phase_with_the_arm_at_rest(
     monkeypatch.setattr("experiments.operator.auto_operator.AutoOperator.line", line)
     session = run_watched(config, tmp_path, 1, press=press)
     events, state = journal(session.folder), replay(journal(session.folder))
-    assert seen[1:] == [moment.phase]  # it came once, and where it should
+    assert seen[1:] == [moment.phase]  # once, in the intended phase
     assert session.done.code == moment.code
     assert events[-1]["event"] == Event.ENDED
     assert (state.phase, state.rejected) == (moment.end, moment.rejected)
@@ -112,7 +112,7 @@ def test_every_open_phase_is_interrupted():
 
 
 @pytest.mark.parametrize("times", [1, 2])
-def test_ctrl_c_in_a_preflight_touches_nothing(config, tmp_path, monkeypatch, times):
+def test_ctrl_c_in_a_preflight_creates_no_data(config, tmp_path, monkeypatch, times):
     def interrupted(*_):
         for _ in range(times):
             signal.raise_signal(signal.SIGINT)

@@ -1,4 +1,4 @@
-"""A hand that is too fast: the guard damps the arm and never lets go of it."""
+"""The guard damps an arm that a hand moves too fast, and never drops its weight."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ from experiments.settings.load import load_settings
 J1, J6 = 0, 5
 PULL = 8.0  # N m of the hand at joint 1
 FASTEST = (3.0, 3.0, 4.0, 5.0, 8.0, 8.0, 8.0)
-# Low limits, so that the safety module has nothing to say yet.
+# Limits so low that the safety module does not act first.
 LIMITS = {
     "overspeed": {"speed": (0.4, *FASTEST[1:])},
     "foot-speed": {"foot_speed": 0.06, "speed": FASTEST},
@@ -47,7 +47,7 @@ class Bench:
         self.plant.hand.let_go()
 
     def pull(self, joint, torque):
-        """Pull at a joint until the guard says something; return its verdict."""
+        """Pull at a joint until the guard acts; its verdict."""
         self.plant.disturbance[joint] = torque
         for _ in range(100):
             self.loop_client.advance(0.004)
@@ -78,7 +78,7 @@ def test_an_arm_that_is_too_fast_is_damped(build, reason):
 
 
 @pytest.mark.parametrize("reason", LIMITS)
-def test_a_damped_arm_gets_its_weight_and_a_brake_and_never_zero_torque(build, reason):
+def test_a_damped_arm_is_braked_and_its_weight_stays_compensated(build, reason):
     bench = build(**LIMITS[reason])
     bench.pull(J1, PULL)
     bench.plant.disturbance[:] = 0.0

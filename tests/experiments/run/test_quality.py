@@ -64,7 +64,7 @@ def test_a_trial_in_the_air_has_no_friction(first_trial, cycles, tmp_path):
         (Flag.FT_FRESH, False, "sensor stale in 5.0% of the cycles"),
     ],
 )
-def test_a_sensor_in_trouble_is_marked(
+def test_a_saturated_or_stale_sensor_is_marked(
     first_trial, cycles, tmp_path, flag, is_set, words
 ):
     few = cycles[:1000]
@@ -78,10 +78,10 @@ AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 
 
 @pytest.mark.parametrize("axis", range(6))
-def test_a_frozen_channel_is_named_and_nothing_of_the_sensor_is_ticked(
+def test_a_frozen_channel_is_named_and_the_sensor_is_not_ticked(
     first_trial, cycles, tmp_path, axis
 ):
-    """Whatever the other five show."""
+    """A single frozen channel casts doubt on the whole sensor."""
     raw = cycles["wrench_raw"]
     raw[len(raw) // 3 :, axis] = raw[len(raw) // 3, axis]
     review = review_trial(rewrite(first_trial, tmp_path / "T.mcap", cycles))
@@ -93,7 +93,7 @@ def test_a_frozen_channel_is_named_and_nothing_of_the_sensor_is_ticked(
 
 
 @pytest.mark.parametrize("ratio", [-3.59, -0.01, 0.0, 5.1, np.inf, -np.inf])
-def test_a_quick_fit_that_cannot_be_is_never_ticked(first_trial, ratio):
+def test_an_impossible_quick_fit_is_marked_bad(first_trial, ratio):
     review = replace(review_trial(first_trial), ratio=ratio)
     for earlier in ([], [ratio] * 4, [0.7, 0.8, 0.9]):
         mark, text = review.lines(earlier)[4]
@@ -102,25 +102,25 @@ def test_a_quick_fit_that_cannot_be_is_never_ticked(first_trial, ratio):
     assert (review.ratio_or_none is None) == np.isinf(ratio)
 
 
-def test_quick_fits_that_cannot_be_are_no_measure_for_others(first_trial):
+def test_impossible_quick_fits_are_left_out_of_the_comparison(first_trial):
     review = review_trial(first_trial)
-    odd = [-3.59, np.inf, np.nan]
-    assert "before" not in review.lines([*odd, 0.8, 0.8])[4][1]
-    assert "(3 before: 0.80" in review.lines([*odd, 0.8, 0.8, 0.8])[4][1]
+    impossible = [-3.59, np.inf, np.nan]
+    assert "before" not in review.lines([*impossible, 0.8, 0.8])[4][1]
+    assert "(3 before: 0.80" in review.lines([*impossible, 0.8, 0.8, 0.8])[4][1]
 
 
-def test_a_quick_fit_of_forces_that_are_doubted_is_not_ticked(first_trial):
+def test_a_quick_fit_of_doubtful_forces_is_not_ticked(first_trial):
     doubt = Doubt("lag", "the force is 500 ms late", "a queue")
     mark, text = replace(review_trial(first_trial), doubts=(doubt,)).lines()[4]
     assert mark == WARNING
     assert text.endswith("not vouched for")
 
 
-def test_less_than_three_trials_before_say_nothing(first_trial):
+def test_too_few_earlier_trials_are_not_compared(first_trial):
     review = review_trial(first_trial)
     for earlier in ([], [0.1, 0.1]):
-        found, text = review.lines(earlier)[4]
-        assert found == GOOD
+        shown, text = review.lines(earlier)[4]
+        assert shown == GOOD
         assert "before" not in text
 
 
@@ -128,23 +128,23 @@ def test_less_than_three_trials_before_say_nothing(first_trial):
     ("off", "mark"),
     [(0.0, GOOD), (0.29, GOOD), (0.31, WARNING), (-0.29, GOOD), (-0.31, WARNING)],
 )
-def test_the_quick_fit_is_held_against_the_trials_before(first_trial, off, mark):
+def test_the_quick_fit_is_compared_with_earlier_trials(first_trial, off, mark):
     """Three standard deviations, 0.1 each, are the limit."""
     review = review_trial(first_trial)
     middle = review.ratio + off
-    found, text = review.lines([middle - 0.1, middle, middle + 0.1])[4]
-    assert found == mark
+    shown, text = review.lines([middle - 0.1, middle, middle + 0.1])[4]
+    assert shown == mark
     assert text.endswith(f"(3 before: {middle:.2f} ± 0.10)")
 
 
-def test_a_force_that_comes_late_is_shown_with_its_offset(first_trial):
+def test_the_lag_of_the_force_is_shown(first_trial):
     review = replace(review_trial(first_trial), lag=ForceLag(0.0213, 0.8))
     assert review.lines()[5] == (GOOD, "lag force 21.3 ms late")
     early = replace(review, lag=ForceLag(-0.004, 0.8))
     assert "4.0 ms early" in early.lines()[5][1]
 
 
-def test_a_late_force_is_no_tick(first_trial):
+def test_a_doubtful_lag_of_the_force_is_not_ticked(first_trial):
     doubt = Doubt("lag", "the force is 500 ms late", "a queue")
     late = replace(
         review_trial(first_trial), lag=ForceLag(0.5, 0.8), doubts=(doubt,)
@@ -153,20 +153,20 @@ def test_a_late_force_is_no_tick(first_trial):
     assert late[6] == (BAD, doubt.text)
 
 
-def test_a_plate_does_not_show_when_the_force_came_which_is_no_tick(first_trial):
+def test_an_unknown_lag_on_a_plate_is_not_ticked(first_trial):
     mark, words = review_trial(first_trial).lines()[5]
     assert mark == WARNING
     assert words.startswith("lag of the force not vouched for")
 
 
-# --- what is thin -------------------------------------------------------------------
+# --- thin cells ---------------------------------------------------------------------
 
 SPARSE = [[0, 0, 0, 0], [0, 900, 3, 0], [0, 900, 900, 0], [0, 0, 0, 0]]
 FULL = [[0, 900, 900, 0], [0, 0, 900, 0], [0, 0, 0, 0], [0, 0, 0, 0]]
 
 
 def session(data, *coverages, verdict="trial-kept"):
-    """Return a session whose trials have these coverages."""
+    """Session whose trials have these coverages."""
     folder = create_session(data, "S0", is_simulated=True, utc_ns=0)
     folder.append_event({"event": "session-started", "terrain": "S0", "trials": 9})
     folder.append_event({"event": "activated"})
@@ -185,6 +185,6 @@ def test_the_samples_of_all_kept_trials_are_counted(tmp_path):
     assert thinnest_cell(session(tmp_path, SPARSE, FULL)) == ""
 
 
-def test_rejected_and_damaged_trials_count_nothing(tmp_path):
+def test_rejected_and_damaged_trials_are_not_counted(tmp_path):
     assert thinnest_cell(session(tmp_path, SPARSE, verdict="trial-rejected")) == ""
     assert thinnest_cell(session(tmp_path, [[1, 2]], "none", None)) == ""

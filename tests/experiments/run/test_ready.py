@@ -35,7 +35,7 @@ keep
 
 
 def quick(asked):
-    """Record for a moment and keep nothing by oneself."""
+    """Key that ends a recording soon; None leaves the prompt to the script."""
     if asked.prompt is Prompt.RECORDING:
         return " " if asked.since > 0.5 else ""
     return None
@@ -43,7 +43,7 @@ def quick(asked):
 
 @pytest.fixture(scope="module")
 def scripted(tmp_path_factory, config):
-    """Return a session of three trials that its script ends after the second."""
+    """A session of three trials that its script ends after the second."""
     folder = tmp_path_factory.mktemp("scripted")
     script = folder / "script.txt"
     script.write_text(SCRIPT)
@@ -77,7 +77,7 @@ def test_a_note_at_the_review_stays_with_the_trial_through_its_verdict(scripted)
     assert note["when"] == noted[1]["utc"]
 
 
-def test_a_pause_is_a_phase_of_its_own_and_ends(scripted):
+def test_a_pause_is_recorded_and_ends(scripted):
     names = [event["event"] for event in journal(scripted.folder)]
     assert names[names.index("paused") + 1] == "continued"
     assert "Paused. ARM: holding. [space] to go on." in scripted.done.out
@@ -86,7 +86,7 @@ def test_a_pause_is_a_phase_of_its_own_and_ends(scripted):
 def test_the_last_review_is_shown_again(scripted):
     lines = scripted.done.out.splitlines()
     first = [line for line in lines if line.startswith("T01 complete")]
-    assert len(first) == 3  # the rejected attempt, the kept one, and that once more
+    assert len(first) == 3  # the rejected attempt, the kept one, and the kept one again
     assert first[1] == first[2]
     last = len(lines) - 1 - lines[::-1].index(first[2])
     assert lines[last + 1].startswith(" ✔ timing worst gap")
@@ -96,7 +96,7 @@ def test_the_last_review_is_shown_again(scripted):
 RESET = "Reset (its digit ticks a step):  1 ☐ wipe  2 ☐ foot at the far end"
 
 
-def test_the_screen_between_trials_says_what_to_do_and_how_long_it_takes(scripted):
+def test_the_screen_between_trials_shows_keys_progress_and_time(scripted):
     lines = scripted.done.out.splitlines()
     heads = [line for line in lines if "ARM: floating" in line]
     assert heads[0].endswith("S001 TF · trial 1 of 3 · kept 0 · rejected 0")
@@ -113,16 +113,16 @@ def test_the_last_trial_is_announced(scripted):
     assert text in scripted.done.out.splitlines()
 
 
-# --- what is thin -------------------------------------------------------------------
+# --- thin cells ---------------------------------------------------------------------
 
 
-def test_what_the_kept_trials_leave_thin_is_said(recorded):
+def test_the_thinnest_cell_of_the_kept_trials_is_shown(recorded):
     lines = recorded.done.out.splitlines()
     first = lines.index(RESET)
-    (said,) = [line for line in lines if line.startswith("Thin so far: ")]
-    assert lines.index(said) > first + 2  # not before there is a kept trial
+    (line,) = [line for line in lines if line.startswith("Thin so far: ")]
+    assert lines.index(line) > first + 2  # not before there is a kept trial
     kept = sidecar(recorded.folder / "trials" / "T01.mcap")["coverage"]
-    assert said == f"Thin so far: {thinnest(CoverageGrid(np.array(kept)))}"
+    assert line == f"Thin so far: {thinnest(CoverageGrid(np.array(kept)))}"
 
 
 def test_the_coverage_of_a_trial_is_in_its_sidecar(recorded):
@@ -137,7 +137,7 @@ def test_the_coverage_of_a_trial_is_in_its_sidecar(recorded):
 @pytest.mark.parametrize(
     "damage", [None, "x", [[1, 2]], [[-1] * 4] * 4, [[1e30] * 4] * 4, [[[1]] * 4] * 4]
 )
-def test_a_damaged_coverage_counts_for_nothing(damage):
+def test_a_damaged_coverage_is_not_counted(damage):
     assert not cells_of(damage).any()
     assert cells_of([[1] * 4] * 4).sum() == 16
 
@@ -145,7 +145,7 @@ def test_a_damaged_coverage_counts_for_nothing(damage):
 # --- the end ------------------------------------------------------------------------
 
 
-def test_the_end_brackets_the_drift_of_the_force(recorded):
+def test_the_drift_of_the_force_is_printed_at_the_end(recorded):
     tares = [e["bias"] for e in journal(recorded.folder) if e["event"] == "tared"]
     assert len(tares) == 3  # one before each trial, one at the end
     drift = json.loads((recorded.folder / "session.json").read_text())["force_drift"]
@@ -169,13 +169,13 @@ def test_every_trial_has_the_tares_before_and_after_it(recorded):
         assert trial.t[-1] < after < 60.0
 
 
-def test_the_zero_between_two_tares_is_nearer_to_the_second_at_the_end(recorded):
+def test_the_interpolated_zero_approaches_the_second_tare(recorded):
     trial = load_trial(recorded.folder / "trials" / "T01.mcap")
     moved = trial.interpolated().force - trial.force
     assert np.linalg.norm(moved[-1]) > np.linalg.norm(moved[0]) > 0.0
 
 
-def test_the_end_compares_the_time_it_took_with_the_estimate(recorded):
+def test_the_end_compares_the_time_taken_with_the_estimate(recorded):
     (line,) = [x for x in recorded.done.out.splitlines() if x.startswith("Took ")]
     took, estimated = (
         int(text.split(":")[0]) * 60 + int(text.split(":")[1])
@@ -205,7 +205,7 @@ def keys_of(folder, text):
     return ScriptedOperator(path)
 
 
-def test_lines_wait_for_their_own_prompt(tmp_path):
+def test_script_lines_wait_for_their_own_prompt(tmp_path):
     keys = keys_of(tmp_path, "keep\nnote two words\nredo 3\n")
     assert keys.answer(asked(Prompt.READY)) == " "
     assert keys.answer(asked(Prompt.RECORDING)) == ""
@@ -219,7 +219,7 @@ def test_lines_wait_for_their_own_prompt(tmp_path):
 
 
 @pytest.mark.parametrize("line", ["note", "remark", "pause now", "redo", "redo 1 2"])
-def test_a_line_that_lacks_or_has_a_text_is_refused(tmp_path, config, line):
+def test_a_script_line_with_missing_or_extra_text_is_refused(tmp_path, config, line):
     script = tmp_path / "script.txt"
     script.write_text(line)
     options = ("--fake", "--fast", "--config", config, "--data", tmp_path / "data")
@@ -229,15 +229,15 @@ def test_a_line_that_lacks_or_has_a_text_is_refused(tmp_path, config, line):
 
 
 ENDS = {
-    # fault, exit code, phase that the session is left in, mode of the arm
+    # fault: exit code, phase of the session afterwards, mode of the arm
     "loop-late": (0, "complete", SafetyMode.IDLE),
     "estop": (4, "unfinished", SafetyMode.E_STOP),
 }
 
 
 @pytest.mark.parametrize("fault", ENDS)
-def test_a_pause_goes_on_after_a_fault_that_can_be_mended(config, tmp_path, fault):
-    struck, told = [], []
+def test_a_pause_continues_only_after_a_recoverable_fault(config, tmp_path, fault):
+    struck, phases = [], []
 
     def press(asked, rig):
         if asked.prompt is Prompt.READY:
@@ -247,8 +247,8 @@ def test_a_pause_goes_on_after_a_fault_that_can_be_mended(config, tmp_path, faul
             rig.faults()[fault]()
             return ""
         if asked.prompt is Prompt.PAUSED:
-            told.append(replay(journal(only_session(tmp_path))).phase)
-            return " " if len(told) > 20 else ""
+            phases.append(replay(journal(only_session(tmp_path))).phase)
+            return " " if len(phases) > 20 else ""
         if asked.prompt is Prompt.REVIEW:
             return "k"
         return quick(asked)
@@ -256,5 +256,5 @@ def test_a_pause_goes_on_after_a_fault_that_can_be_mended(config, tmp_path, faul
     seen = run_watched(config, tmp_path, 1, press=press)
     state = replay(journal(seen.folder))
     assert (seen.done.code, state.phase, seen.rig.network.safety_mode) == ENDS[fault]
-    assert (set(told) == {"paused"}) is (seen.done.code == 0)
+    assert (set(phases) == {"paused"}) is (seen.done.code == 0)
     assert seen.done.out.count("Paused. ARM: holding.") == 2 - bool(seen.done.code)

@@ -1,4 +1,4 @@
-"""What the screen of a running trial says."""
+"""The screen of a running trial."""
 
 from types import SimpleNamespace
 
@@ -11,7 +11,7 @@ from experiments.session.sidecar import TrialOutcome
 from experiments.settings.load import load_settings
 
 
-def test_missed_are_the_cycles_that_never_came_and_not_the_late_ones():
+def test_missed_counts_the_skipped_cycles_of_the_trial_and_no_late_ones():
     status = LoopStatus(skipped=4, late=9)
     samples = np.zeros(600, CYCLE.dtype)
     samples["host_ns"] = np.arange(600) * 2_000_000

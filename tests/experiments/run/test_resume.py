@@ -1,4 +1,4 @@
-"""A session that was killed, and what a resume and a redo make of it."""
+"""A killed session is resumed, and a trial redone, without losing a recording."""
 
 import json
 import shutil
@@ -33,7 +33,7 @@ AUTO = ("--operator-script", "auto")
 
 @dataclass(frozen=True)
 class Reopened:
-    """A session before and after it was opened once more."""
+    """A session before and after it was reopened."""
 
     done: Done
     folder: Path
@@ -46,7 +46,7 @@ def digests(folder):
 
 
 def short(asked):
-    """End a recording at once and keep it; None leaves it to AutoOperator."""
+    """Key that ends a recording at once or keeps it; None leaves it to AutoOperator."""
     if asked.prompt is Prompt.RECORDING:
         return " " if asked.since > 0.3 else ""
     return "k" if asked.prompt is Prompt.REVIEW else None
@@ -54,7 +54,7 @@ def short(asked):
 
 @pytest.fixture(scope="module")
 def resumed(tmp_path_factory, config):
-    """Return a session of two trials, killed in the second one, and resumed."""
+    """A session of two trials, killed in the second one and resumed."""
     data = tmp_path_factory.mktemp("killed")
 
     def press(asked, rig):
@@ -71,7 +71,7 @@ def resumed(tmp_path_factory, config):
 
 @pytest.fixture(scope="module")
 def redone(tmp_path_factory, recorded):
-    """Return a copy of the session of two trials, the first one redone."""
+    """A copy of the session of two trials with the first one redone."""
     data = tmp_path_factory.mktemp("redone") / "data"
     shutil.copytree(recorded.data, data)
     folder = only_session(data)
@@ -89,11 +89,11 @@ def test_a_killed_session_is_resumed_and_completed(resumed):
     assert (fields["phase"], fields["kept"]) == ("complete", ["T01", "T02"])
 
 
-def test_a_session_does_not_name_itself_as_open_elsewhere(resumed):
+def test_a_resumed_session_does_not_report_itself_as_open(resumed):
     assert "is open in process" not in resumed.done.out
 
 
-def test_a_resume_says_what_becomes_of_the_trial_that_ran(resumed):
+def test_a_resume_says_what_happens_to_the_running_trial(resumed):
     first, second, *_ = resumed.done.out.splitlines()
     assert first == (
         "S001 ended without closing. T02 will be redone, its data are in "
@@ -102,12 +102,12 @@ def test_a_resume_says_what_becomes_of_the_trial_that_ran(resumed):
     assert second == "session S001: 1 of 2 kept"
 
 
-def test_a_kill_leaves_earlier_trials_as_they_were(resumed):
+def test_a_kill_leaves_earlier_trials_unchanged(resumed):
     assert set(resumed.before) >= {"T01.mcap"}
     assert digests(resumed.folder)["T01.mcap"] == resumed.before["T01.mcap"]
 
 
-def test_what_was_recorded_before_the_kill_is_in_rejected(resumed):
+def test_the_recording_up_to_the_kill_is_in_rejected(resumed):
     path = resumed.folder / "rejected" / "T02a.mcap"
     verified = verify_file(path)
     assert not verified.is_complete
@@ -121,7 +121,7 @@ def test_what_was_recorded_before_the_kill_is_in_rejected(resumed):
     assert not list((resumed.folder / "trials").glob("*.partial"))
 
 
-def test_the_journal_of_a_resumed_session_replays_to_what_the_files_say(resumed):
+def test_the_journal_of_a_resumed_session_has_every_attempt_and_opening(resumed):
     events = journal(resumed.folder)
     state = replay(events)
     assert state.kept_attempts == ((1, 1), (2, 2))
@@ -142,7 +142,7 @@ def test_a_complete_session_is_not_resumed(resumed):
     assert done.err.startswith("S001 cannot be opened: the session is complete.")
 
 
-def test_a_redo_records_one_trial_and_puts_the_old_one_aside(redone):
+def test_a_redo_records_one_trial_and_sets_the_old_one_aside(redone):
     assert (redone.done.code, redone.done.err) == (0, "")
     after = digests(redone.folder)
     old = redone.folder / "rejected" / "T01a.mcap"
@@ -173,7 +173,7 @@ def test_a_redone_session_is_complete_again(redone):
         ("first", "'first' is not a trial."),
     ],
 )
-def test_a_redo_of_no_trial_is_refused(recorded, trial, text):
+def test_a_redo_of_an_unknown_trial_is_refused(recorded, trial, text):
     done = traction("redo", "S001", trial, *AUTO, "--data", recorded.data)
     assert done.code == 2
     assert done.err.startswith(text)
@@ -197,9 +197,7 @@ def test_a_redo_under_other_conditions_is_refused_with_the_differences(
     assert digests(only_session(data)) == digests(recorded.folder)
 
 
-def test_a_trial_whose_sidecar_is_damaged_is_redone_and_the_old_one_kept(
-    tmp_path, recorded
-):
+def test_a_redo_despite_a_damaged_sidecar_keeps_the_old_recording(tmp_path, recorded):
     data = tmp_path / "data"
     shutil.copytree(recorded.data, data)
     folder = only_session(data)
@@ -222,7 +220,7 @@ def test_a_trial_whose_sidecar_is_damaged_is_redone_and_the_old_one_kept(
         (asdict(FakeOptions("fast", seed=3)), FRICTION),
     ],
 )
-def test_a_simulated_arm_rubs_on_as_it_did(fake, friction):
+def test_a_reopened_simulation_keeps_its_friction_and_seed(fake, friction):
     opened = fake_of({"fake": fake}, SimpleNamespace(mode=None))
     assert (opened.seed, opened.friction, opened.mode) == (3, friction, "fast")
 
@@ -236,5 +234,7 @@ def test_a_simulated_arm_rubs_on_as_it_did(fake, friction):
         (None, None, "paced"),
     ],
 )
-def test_simulated_time_passes_as_before_or_as_asked(fake, asked, mode):
+def test_a_reopened_simulation_runs_in_the_recorded_or_requested_mode(
+    fake, asked, mode
+):
     assert fake_of({"fake": fake}, SimpleNamespace(mode=asked)).mode == mode

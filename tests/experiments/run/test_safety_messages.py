@@ -1,4 +1,4 @@
-"""What a person is told when the safety module acts, and what it is told to watch."""
+"""Messages about stops of the safety module, and the limits set in the module."""
 
 import pytest
 
@@ -15,7 +15,7 @@ from wam.driver.safety_module import SafetyLimits
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 
-FOUND = FaultContext("T01", 1.5)
+CONTEXT = FaultContext("T01", 1.5)
 SAFETY_TABLE = """
 speed_warning = 0.5       # m/s at elbow and forearm; left out: 0.9 of the fault
 speed_fault = 1.0  """
@@ -50,13 +50,13 @@ VL1 = 45
         ),
     ],
 )
-def test_a_stop_of_the_safety_circuit_is_told_with_its_cause(reason, causes, text):
+def test_a_stop_of_the_safety_circuit_is_reported_with_its_cause(reason, causes, text):
     verdict = verdict_for(Fault(reason), CircuitCauses(causes))
-    assert fault_text(verdict, FOUND).startswith(text)
+    assert fault_text(verdict, CONTEXT).startswith(text)
 
 
 def in_recording(act):
-    """Return a `press` that lets `act(rig)` happen once, in the first recording."""
+    """A `press` that calls `act(rig)` once, in the first recording."""
     done = []
 
     def press(asked, rig):
@@ -66,7 +66,7 @@ def in_recording(act):
     return press
 
 
-def tell(number, value):
+def send_property(number, value):
     def act(rig):
         now_ns = rig.plant.t_ns
         rig.network.receive(now_ns, 0x00A, encode_set(number, value))
@@ -75,25 +75,25 @@ def tell(number, value):
 
 
 def test_a_velocity_warning_is_recorded_and_the_trial_is_kept(config, tmp_path):
-    done = run_watched(config, tmp_path, 1, press=in_recording(tell(VL1, 1)))
+    done = run_watched(config, tmp_path, 1, press=in_recording(send_property(VL1, 1)))
     assert done.done.code == 0
     flags = TrialReader(done.folder / "trials" / "T01.mcap").cycles().data["flags"]
     assert (flags & Flag.SAFETY_WARNING).any()
     assert not (flags & Flag.SAFETY_FAULT).any()
 
 
-def test_a_trial_says_how_the_pucks_felt_when_it_began(first_trial):
+def test_a_trial_records_puck_temperatures_and_errors_at_its_start(first_trial):
     fields = TrialReader(first_trial).metadata["provenance"]
     assert fields["pucks:temperature_degc"] == "35 35 35 35 35 35 35"
     assert fields["pucks:error"] == "0 0 0 0 0 0 0"
 
 
-def test_slips_of_a_usual_trial_neither_warn_nor_fault(first_trial):
+def test_a_usual_trial_has_no_safety_warning_or_fault(first_trial):
     flags = TrialReader(first_trial).cycles().data["flags"]
     assert not (flags & (Flag.SAFETY_WARNING | Flag.SAFETY_FAULT)).any()
 
 
-def test_the_page_shows_firmware_zero_and_temperatures(tmp_path):
+def test_the_preflight_page_shows_firmware_zero_and_temperatures(tmp_path):
     done = traction("check", "--fake", "--fast", "--data", tmp_path)
     assert "firmware 200, zeroed, 33-35 °C" in done.out
     assert "idle, firmware 200" in done.out
@@ -115,13 +115,13 @@ def test_a_table_without_safety_keeps_the_power_up_values(tmp_path):
     assert build_safety_limits(load_settings(path).rig) == SafetyLimits()
 
 
-def test_a_warning_left_out_is_nine_tenths_of_its_fault(tmp_path):
+def test_a_speed_warning_left_out_is_derived_from_its_fault(tmp_path):
     limits = limits_of(tmp_path, SAFETY_TABLE, "\nspeed_fault = 1.5")
     assert (limits.speed_fault, limits.speed_warning) == (1.5, pytest.approx(1.35))
     assert limits.words()["VL1"] == 0x1599
 
 
-def test_a_torque_warning_left_out_is_nine_tenths_of_its_fault(tmp_path):
+def test_a_torque_warning_left_out_is_derived_from_its_fault(tmp_path):
     line = "torque_warning_units = 4731"
     assert limits_of(tmp_path, line, "#").torque_warning_units == 4683
 
@@ -146,7 +146,7 @@ def test_a_torque_warning_left_out_is_nine_tenths_of_its_fault(tmp_path):
         ),
     ],
 )
-def test_limits_that_would_switch_the_module_off_are_refused(tmp_path, old, new, text):
+def test_safety_limits_out_of_range_are_refused(tmp_path, old, new, text):
     path = write_config(tmp_path, rig=(old, new))
     done = traction("check", "--config-only", "--config", path)
     assert done.code == 2

@@ -1,7 +1,7 @@
 """One flipped sign or turned frame anywhere makes measured and true disagree.
 
-The proof that frames, signs, tare and kinematics are right is a comparison with what
-the simulation knows; here it is proven that the comparison can fail.
+A comparison with the simulated truth shows that frames, signs, tare and kinematics are
+right; these tests show that the comparison can fail.
 """
 
 from dataclasses import replace
@@ -24,12 +24,12 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 # m/s rms; N mean: three standard deviations of drift and bias of one trial
 LARGEST_V, LARGEST_F = 1.5e-3, 1.0
 # The wrist's rotation is nearly its own inverse where the foot stands upright: one that
-# is turned backwards shows only where the foot is pressed well.
+# is turned backwards shows only where the foot is pressed hard.
 PRESSED = ("virtual_mass = 0.30", "virtual_mass = 1.0")  # kg
 
 
-class ReadingRig(plain_world.FakeRig):
-    """A rig whose sensor is mounted in another way than rig.toml says."""
+class MismountedRig(plain_world.FakeRig):
+    """A rig whose sensor is mounted otherwise than rig.toml states."""
 
     changes: ClassVar[dict] = {}
 
@@ -39,7 +39,7 @@ class ReadingRig(plain_world.FakeRig):
 
 
 class TurnedRig(plain_world.FakeRig):
-    """A rig whose container lies 30 degrees beside where the matrix says."""
+    """A rig whose container is turned by 30 degrees from the matrix."""
 
     def __init__(self, scene, *rest, **options):
         frame = replace(scene.frame, heading=scene.frame.heading + np.radians(30.0))
@@ -48,8 +48,8 @@ class TurnedRig(plain_world.FakeRig):
 
 def sensor(**changes):
     def apply(patch):
-        patch.setattr(ReadingRig, "changes", changes)
-        patch.setattr(plain_world, "FakeRig", ReadingRig)
+        patch.setattr(MismountedRig, "changes", changes)
+        patch.setattr(plain_world, "FakeRig", MismountedRig)
 
     return apply
 
@@ -59,7 +59,7 @@ def container_turned(patch):
 
 
 def joint_reversed(joint):
-    """Let the driver count one joint backwards; the motors do not."""
+    """Reverse one joint in the driver, but not in the motors."""
 
     def apply(patch):
         right = Transmission.joints
@@ -84,7 +84,7 @@ def force_turned_backwards(patch):
 
 
 def traction_with(*signs):
-    """Let the projection onto the terrain's axes have these signs."""
+    """Multiply the projection onto the terrain's axes by these signs."""
 
     def apply(patch):
         right = ft_sensor.payload.traction
@@ -112,7 +112,7 @@ QUICK = ("sensor sign", "sign of v_t")
 
 
 def agrees(folder, flip=None):
-    """Return whether a recorded trial agrees with its truth; no trial is no."""
+    """Whether a recorded trial agrees with its truth; False without a trial."""
     config = write_config(folder, rig=PRESSED)
     with pytest.MonkeyPatch.context() as patch:
         if flip is not None:
@@ -121,12 +121,12 @@ def agrees(folder, flip=None):
         if done.code:
             return False
         path = only_session(folder / "data") / "trials" / "T01.mcap"
-        found = compare_with_truth(load_trial(path))
-    assert found is not None
-    return found.v_t < LARGEST_V and max(found.F_t, found.F_n) < LARGEST_F
+        errors = compare_with_truth(load_trial(path))
+    assert errors is not None
+    return errors.v_t < LARGEST_V and max(errors.F_t, errors.F_n) < LARGEST_F
 
 
-def test_measured_and_true_agree_as_the_program_is(tmp_path):
+def test_measurements_agree_with_the_truth_without_a_flip(tmp_path):
     assert agrees(tmp_path)
 
 

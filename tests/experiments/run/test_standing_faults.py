@@ -1,4 +1,4 @@
-"""A fault that goes on while nothing is wanted of the arm is told once."""
+"""A fault that persists while the arm is not needed is reported once."""
 
 from dataclasses import replace
 
@@ -11,23 +11,23 @@ from tests.experiments.built import watch_builds
 from tests.experiments.program import journal, run_watched
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
-MANY = 40  # looks of 20 ms, of which the fault takes 5 and more each time it is mended
+MANY = 40  # looks of 20 ms; each clearing of the fault takes 5 or more of them
 
 
 def narrow(cycle):
-    """Let joint 6 stand beyond what it is allowed from now on."""
+    """Narrow the upper limit of joint 6 so that the joint is beyond it."""
     upper = (*cycle.limits.q_upper[:5], -1.5, cycle.limits.q_upper[6])
     cycle.limits = replace(cycle.limits, q_upper=upper)
 
 
 @pytest.fixture
 def built(monkeypatch):
-    """Return what is built for a session from now on."""
+    """The parts of a session that are built during the test."""
     return watch_builds(monkeypatch)
 
 
 @pytest.mark.parametrize("prompt", [Prompt.REVIEW, Prompt.PAUSED])
-def test_keys_are_heard_while_a_fault_goes_on(config, tmp_path, built, prompt):
+def test_keys_are_read_while_a_fault_persists(config, tmp_path, built, prompt):
     looks, states = [], set()
 
     def press(asked, _):
@@ -40,7 +40,7 @@ def test_keys_are_heard_while_a_fault_goes_on(config, tmp_path, built, prompt):
                 return " " if len(looks) > MANY else ""
             return "q" if len(looks) > MANY else ""
         if asked.prompt is Prompt.READY and asked.since < 2.0:
-            return ""  # the foot is led to where it begins
+            return ""  # the foot is led to the start
         if asked.prompt is Prompt.READY:
             return "p" if prompt is Prompt.PAUSED else " "
         if asked.prompt is Prompt.RECORDING:

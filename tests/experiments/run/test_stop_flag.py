@@ -12,7 +12,7 @@ NUMBERS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def requested(*pauses_ns):
-    """Return a flag after one request and one more after each pause."""
+    """Flag after one request and one more after signum pause."""
     clock = SteppedClock()
     stop = StopFlag(clock)
     stop.request()
@@ -22,7 +22,7 @@ def requested(*pauses_ns):
     return stop
 
 
-def test_urgent_means_within_three_seconds():
+def test_the_time_limit_of_urgent_requests_is_unchanged():
     assert URGENT_NS == 3_000_000_000
 
 
@@ -42,7 +42,7 @@ def test_two_requests_are_urgent_up_to_the_limit(pause_ns, is_urgent):
     assert (stop.count, stop.is_urgent) == (2, is_urgent)
 
 
-def test_the_time_counts_from_the_request_before():
+def test_the_time_counts_from_the_previous_request():
     assert requested(2 * URGENT_NS, URGENT_NS).is_urgent
     assert not requested(2 * URGENT_NS, 2 * URGENT_NS).is_urgent
 
@@ -53,7 +53,7 @@ def test_an_urgent_request_stays_urgent():
 
 
 @pytest.mark.parametrize(("is_service", "count"), [(True, 0), (False, 1)])
-def test_a_service_that_was_told_to_outlive_its_terminal_does(is_service, count):
+def test_an_ignored_hangup_stays_ignored_in_a_service_only(is_service, count):
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
         stop = StopFlag()
@@ -65,7 +65,7 @@ def test_a_service_that_was_told_to_outlive_its_terminal_does(is_service, count)
         signal.signal(signal.SIGHUP, before)
 
 
-def test_a_service_that_loses_its_terminal_otherwise_ends():
+def test_a_hangup_stops_a_service_by_default():
     stop = StopFlag()
     with handle_signals(stop, is_service=True):
         signal.raise_signal(signal.SIGHUP)
@@ -73,23 +73,23 @@ def test_a_service_that_loses_its_terminal_otherwise_ends():
 
 
 @pytest.mark.parametrize("number", NUMBERS)
-def test_a_signal_is_a_request_and_its_handler_is_given_back(number):
-    before = [signal.getsignal(each) for each in NUMBERS]
+def test_a_signal_is_a_request_and_its_handler_is_restored(number):
+    before = [signal.getsignal(signum) for signum in NUMBERS]
     stop = StopFlag()
     with handle_signals(stop):
         signal.raise_signal(number)
         assert (stop.count, stop.is_urgent) == (1, False)
-    assert [signal.getsignal(each) for each in NUMBERS] == before
+    assert [signal.getsignal(signum) for signum in NUMBERS] == before
 
 
-def test_signals_are_given_back_after_an_error():
-    before = [signal.getsignal(each) for each in NUMBERS]
+def test_signal_handlers_are_restored_after_an_error():
+    before = [signal.getsignal(signum) for signum in NUMBERS]
     with pytest.raises(ZeroDivisionError), handle_signals(StopFlag()):
         raise ZeroDivisionError
-    assert [signal.getsignal(each) for each in NUMBERS] == before
+    assert [signal.getsignal(signum) for signum in NUMBERS] == before
 
 
-def test_a_fault_of_the_arm_has_the_verdict_and_its_reason():
+def test_an_arm_fault_error_holds_the_verdict_and_its_reason():
     verdict = GuardVerdict(Action.IDLE, Fault.E_STOP)
     fault = ArmFaultError(verdict)
     assert fault.verdict is verdict

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.slow
 
 
 def short_trial(asked):
-    """End a recording at once and keep it; None leaves it to AutoOperator."""
+    """Key that ends a recording at once or keeps it; None leaves it to AutoOperator."""
     if asked.prompt is Prompt.RECORDING:
         return " " if asked.since > 0.3 else ""
     return "k" if asked.prompt is Prompt.REVIEW else None
@@ -27,7 +27,7 @@ def last_mode(path):
 
 @pytest.fixture(scope="module")
 def once(tmp_path_factory, config):
-    """Return a session that got one Ctrl-C in its second trial."""
+    """A session with one Ctrl-C in its second trial."""
 
     def press(asked, rig):
         if asked.prompt is Prompt.RECORDING and asked.trial == 2 and asked.since > 0.3:
@@ -40,7 +40,7 @@ def once(tmp_path_factory, config):
 
 @pytest.fixture(scope="module")
 def twice(tmp_path_factory, config):
-    """Return a session that got Ctrl-C twice at once in its first trial."""
+    """A session with Ctrl-C twice at once in its first trial."""
 
     def press(asked, rig):
         if asked.prompt is Prompt.RECORDING and asked.since > 0.3:
@@ -52,9 +52,9 @@ def twice(tmp_path_factory, config):
 
 @pytest.fixture(scope="module")
 def disturbed(tmp_path_factory, config):
-    """Return a session with the wrist hit in one review, a stop in the next.
+    """A session with the wrist hit in one review and a stop in the next.
 
-    The safety module does not count the wrist, so the guard is the first to act.
+    The safety module does not watch the wrist, so the guard acts first.
     """
     pushed = []
 
@@ -71,7 +71,7 @@ def disturbed(tmp_path_factory, config):
     return run_watched(config, tmp_path_factory.mktemp("disturbed"), 2, press=press)
 
 
-def test_ctrl_c_ends_the_session_unfinished_with_exit_code_5(once):
+def test_ctrl_c_ends_the_session_unfinished(once):
     assert once.done.code == 5
     assert journal(once.folder)[-1]["reason"] == "unfinished"
     assert "Nothing that was recorded is lost. 1 trial is safe in" in once.done.out
@@ -85,7 +85,7 @@ def test_ctrl_c_closes_the_running_trial_as_interrupted(once):
     assert not list(once.folder.rglob("*.partial"))
 
 
-def test_ctrl_c_leaves_earlier_trials_as_they_were(once):
+def test_ctrl_c_leaves_earlier_trials_unchanged(once):
     path = once.folder / "trials" / "T01.mcap"
     assert verify_file(path).sha256 == sidecar(path)["sha256"]
 
@@ -98,7 +98,7 @@ def test_ctrl_c_holds_the_arm_until_the_trial_is_closed_and_then_brakes_it(once)
     assert hint.startswith("To go on: traction resume S001")
 
 
-def test_ctrl_c_twice_damps_and_brakes_the_arm_before_the_file_is_closed(twice):
+def test_ctrl_c_twice_brakes_the_arm_before_the_file_is_closed(twice):
     path = twice.folder / "rejected" / "T01a.mcap"
     assert twice.done.code == 5
     assert last_mode(path) is SafetyMode.IDLE
@@ -137,12 +137,12 @@ def test_ctrl_c_twice_idles_the_arm_without_waiting_for_a_hand(
     assert waited <= (apart + 0.1 if apart else 0.0)
 
 
-def test_signals_are_given_back_after_a_session(once, twice):
+def test_signal_handlers_are_restored_after_a_session(once, twice):
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
 
 
-def test_a_fault_during_the_review_does_not_cost_the_trial(disturbed):
+def test_a_fault_during_the_review_does_not_lose_the_trial(disturbed):
     assert "Joint 6 " in disturbed.done.err
     assert "ARM: damped where it is, until you let it hold." in disturbed.done.err
     assert (disturbed.folder / "trials" / "T01.mcap").exists()
@@ -175,9 +175,7 @@ def short_trial_of(asked, rig):
     return short_trial(asked)
 
 
-def test_a_crash_of_the_program_brakes_the_arm_and_says_where_the_log_is(
-    tmp_path, config
-):
+def test_a_crash_of_the_program_brakes_the_arm_and_names_the_log(tmp_path, config):
     def press(asked, rig):
         if asked.prompt is Prompt.LIFT and asked.since > 0.1:
             raise ZeroDivisionError("so to speak")
@@ -212,8 +210,8 @@ def test_a_fault_after_the_last_trial_names_the_report_and_nothing_to_resume(
     assert "resume" not in seen.done.err + seen.done.out
 
 
-class Hands:
-    """A clock that a test moves."""
+class ManualClock:
+    """Clock that the test advances."""
 
     def __init__(self):
         self.now = 5_000_000_000
@@ -223,8 +221,8 @@ class Hands:
 
 
 @pytest.mark.parametrize(("pause", "is_urgent"), [(3.0, True), (3.1, False)])
-def test_a_second_request_is_urgent_within_three_seconds(pause, is_urgent):
-    clock = Hands()
+def test_a_second_request_soon_after_the_first_is_urgent(pause, is_urgent):
+    clock = ManualClock()
     stop = StopFlag(clock)
     stop.request()
     assert (stop.count, stop.is_urgent) == (1, False)

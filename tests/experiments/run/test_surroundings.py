@@ -24,7 +24,7 @@ def model_of(row):
 
 
 @pytest.mark.parametrize("name", ROWS)
-def test_a_container_reaches_from_the_floor_to_its_rim_and_beyond_the_trial(name):
+def test_a_container_box_reaches_to_the_floor_and_beyond_the_trial(name):
     frame = terrain_frame(ROWS[name])
     box = container_box(frame)
     half = 0.5 * box.size
@@ -38,7 +38,7 @@ def test_a_container_reaches_from_the_floor_to_its_rim_and_beyond_the_trial(name
 
 @pytest.mark.parametrize("name", A_ROW_OF_EACH_FOOT.values(), ids=A_ROW_OF_EACH_FOOT)
 @pytest.mark.parametrize("choose", [choose_poses, choose_orientations])
-def test_every_shipped_pose_and_way_is_clear_for_every_foot(name, choose):
+def test_every_calibration_pose_and_path_is_clear_for_every_foot(name, choose):
     row = ROWS[name]
     model, space = model_of(row), free_space(SETTINGS, row)
     poses = choose(model, 12, space)
@@ -52,17 +52,17 @@ def test_every_shipped_pose_and_way_is_clear_for_every_foot(name, choose):
         here = halt.q
 
 
-def test_an_arm_below_something_is_not_lifted_through_it():
+def test_an_arm_below_the_rim_is_not_lifted_through_the_container():
     row = ROWS["S15"]
     model, space = model_of(row), free_space(SETTINGS, row)
-    beside = np.array([1.2, 1.2, 0.0, 1.6, 0.0, 0.5, 0.0])  # lower than the container
+    low_pose = np.array([1.2, 1.2, 0.0, 1.6, 0.0, 0.5, 0.0])  # lower than the container
     with pytest.raises(SettingsError, match="cannot rise"):
-        plan_waypoints(model, np.array([*(-beside[:1]), *beside[1:]]), [], space)
+        plan_waypoints(model, np.array([*(-low_pose[:1]), *low_pose[1:]]), [], space)
 
 
 @pytest.mark.parametrize("side", [-1.0, 0.0, 1.0])
-def test_a_pose_is_looked_at_from_both_sides_it_is_approached_from(side):
-    """A thin post 31 mm from the foot: 30 mrad towards it and it is too close."""
+def test_a_pose_is_checked_slightly_to_both_sides_too(side):
+    """A thin post that is too close only 30 mrad to one side of the pose."""
 
     class Post:
         def nearest(self, q):

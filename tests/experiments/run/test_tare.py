@@ -1,4 +1,4 @@
-"""The tare between two trials, and what it may not hide."""
+"""The tare between two trials, and the forces that it must not hide."""
 
 import json
 from types import SimpleNamespace
@@ -41,40 +41,39 @@ BIAS = np.array([0.5, -1.0, 2.0, 0.01, 0.02, 0.03])
 
 def calibration(foot):
     fit = SensorFit(0.45, np.zeros(3), BIAS, 0.0, 1.0, 0.01, 0.001)
-    found = SensorCalibration(
+    calibrated = SensorCalibration(
         fit, foot, 0.0, "2027-01-01T00:00:00Z", False, np.eye(3)[None], BIAS[None]
     )
-    return {"calibration:ft_sensor.toml": sensor_to_toml(found)}
+    return {"calibration:ft_sensor.toml": sensor_to_toml(calibrated)}
 
 
 def payload(mass):
     return Payload(mass, np.zeros(3), np.eye(3), 1.0, np.zeros(6))
 
 
-def test_a_calibrated_sensor_is_known_with_its_foot_only():
+def test_the_bias_of_a_calibrated_sensor_is_known_with_its_foot_only():
     known = known_bias(calibration("tread"), "tread", is_simulated=False)
     np.testing.assert_array_equal(known, BIAS)
     assert known_bias(calibration("tread"), "bare", is_simulated=False) is None
 
 
-def test_a_wrist_is_not_turned_for_a_sensor_that_nobody_calibrated(tmp_path):
+def test_the_wrist_is_not_turned_for_an_uncalibrated_sensor(tmp_path):
     context = make_context(tmp_path, Keys())
     context.rig.settings.calibrations, context.rig.row.foot = {}, "tread"
     verify_mounting(context)
     assert (context.loop_client.requested, context.loop_client.advanced) == ([], 0.0)
 
 
-def test_a_real_sensor_that_nobody_calibrated_is_not_known():
+def test_the_bias_of_an_uncalibrated_real_sensor_is_unknown():
     assert known_bias({}, "tread", is_simulated=False) is None
     assert known_bias({"rig": "bias = 1"}, "tread", is_simulated=False) is None
 
 
-def test_a_simulated_sensor_has_no_bias_of_its_own():
+def test_an_uncalibrated_simulated_sensor_has_no_bias():
     np.testing.assert_array_equal(known_bias({}, "tread", is_simulated=True), 0.0)
 
 
-def test_a_wrong_mass_of_the_foot_shows_as_its_weight():
-    """What the tare takes away beside the sensor's own bias."""
+def test_a_wrong_mass_of_the_foot_shows_as_a_residual_force():
     truth, believed = payload(0.45), payload(0.40)
     reading = BIAS + truth.weight(np.eye(3))
     right = truth.tared(reading, np.eye(3))
@@ -84,13 +83,13 @@ def test_a_wrong_mass_of_the_foot_shows_as_its_weight():
 
 
 class LiftedFoot(StubClient):
-    """A loop whose foot hangs still in the air, with a sensor that streams.
+    """Loop whose foot hangs still in the air, with a streaming sensor.
 
     Attributes:
-        height: of the foot above the plane, by the seconds since the start [m].
-        speed: of the foot, linear and angular [m/s, rad/s].
-        force: along x, by the seconds since the start [N].
-        is_valid: the sensor vouches for its numbers.
+        height: height of the foot above the plane [m], by seconds since the start.
+        speed: velocity of the foot, linear and angular [m/s, rad/s].
+        force: force along x [N], by seconds since the start.
+        is_valid: whether the sensor marks its samples as valid.
     """
 
     def __init__(self, clock):
@@ -127,7 +126,7 @@ class LiftedFoot(StubClient):
 
 
 def lifted(tmp_path, *keys, mass=0.0, residual=0.5, calibrations=None):
-    """Return a context whose foot of `mass` [kg] is lifted, and is known to weigh 0."""
+    """Context of a lifted foot whose mass is set to `mass` [kg]."""
     context = make_context(tmp_path, Keys(*keys))
     rig = context.rig
     rig.backend.loop_client = LiftedFoot(rig.clock)
@@ -146,7 +145,7 @@ def events(context, event):
     return [e for e in context.metadata.folder.events() if e["event"] == event]
 
 
-def test_a_tare_gives_the_bias_to_the_loop_and_the_rig_and_the_journal(tmp_path):
+def test_a_tare_passes_its_bias_to_loop_rig_and_journal(tmp_path):
     context = lifted(tmp_path)
     take_tare(context, TrialName(2, 1))
     right = pytest.approx([0.1, 0, 0, 0, 0, 0])
@@ -165,12 +164,12 @@ def test_the_foot_is_guided_until_it_is_still_and_then_held(tmp_path):
 
 
 def keep_first(context):
-    """Let a first trial be recorded and kept."""
+    """Record and keep a first trial."""
     for name in (Event.TRIAL_STARTED, Event.TRIAL_RECORDED, Event.TRIAL_KEPT):
         context.journal.append(name, trial=1, attempt=1)
 
 
-def test_a_tare_is_written_to_the_trial_before_it_and_the_next_one_is_not(tmp_path):
+def test_only_the_first_tare_after_a_trial_is_written_to_its_sidecar(tmp_path):
     context = lifted(tmp_path)
     keep_first(context)
     sidecar = context.metadata.folder.trials / "T01.json"
@@ -186,18 +185,20 @@ def test_a_tare_is_written_to_the_trial_before_it_and_the_next_one_is_not(tmp_pa
     assert json.loads(sidecar.read_text()) == written
 
 
-@pytest.mark.parametrize(("moved", "is_told"), [(1.9, False), (2.1, True)])
-def test_a_zero_that_moved_between_two_tares_is_told(tmp_path, capsys, moved, is_told):
+@pytest.mark.parametrize(("moved", "is_reported"), [(1.9, False), (2.1, True)])
+def test_a_zero_that_moved_between_two_tares_is_reported(
+    tmp_path, capsys, moved, is_reported
+):
     context = lifted(tmp_path, residual=5.0)
     take_tare(context, TrialName(1, 1))
     keep_first(context)
     context.loop_client.force = lambda seconds: 0.1 + moved
     take_tare(context, TrialName(2, 1))
     words = f"T01: the sensor's zero moved by {moved} N"
-    assert (words in capsys.readouterr().out) is is_told
+    assert (words in capsys.readouterr().out) is is_reported
 
 
-def test_a_zero_of_another_opening_is_compared_with_none(tmp_path, capsys):
+def test_the_zero_of_an_earlier_opening_is_not_compared(tmp_path, capsys):
     context = lifted(tmp_path, residual=50.0)
     take_tare(context, TrialName(1, 1))
     keep_first(context)
@@ -211,7 +212,7 @@ def test_a_zero_of_another_opening_is_compared_with_none(tmp_path, capsys):
     assert "next_tare" not in json.loads(sidecar.read_text())
 
 
-def test_the_operator_is_asked_to_lift_all_the_time(tmp_path):
+def test_the_operator_is_asked_to_lift_during_the_whole_tare(tmp_path):
     context = lifted(tmp_path)
     take_tare(context, TrialName(3, 2))
     asked = {(s.prompt, s.trial, s.attempt) for s in context.operator.states}
@@ -221,9 +222,7 @@ def test_the_operator_is_asked_to_lift_all_the_time(tmp_path):
 @pytest.mark.parametrize(
     ("height", "waits"), [(0.031, False), (0.03, True), (0.029, True)]
 )
-def test_a_foot_counts_as_lifted_three_centimetres_above_the_plane(
-    tmp_path, height, waits
-):
+def test_a_foot_counts_as_lifted_above_the_minimum_height(tmp_path, height, waits):
     context = lifted(tmp_path)
     context.loop_client.height = lambda s: 0.1 if s > 1.0 else height
     take_tare(context, TrialName(1, 1))
@@ -242,7 +241,7 @@ def test_a_foot_counts_as_lifted_three_centimetres_above_the_plane(
         ((0, 0, 0, 1.0, 0, 0), True),
     ],
 )
-def test_a_foot_is_still_below_a_centimetre_a_second(tmp_path, speed, is_still):
+def test_a_foot_counts_as_still_below_the_speed_limit(tmp_path, speed, is_still):
     keys = [""] * 100 + ["q"]
     context = lifted(tmp_path, *keys)
     context.loop_client.speed = speed
@@ -254,14 +253,14 @@ def test_a_foot_is_still_below_a_centimetre_a_second(tmp_path, speed, is_still):
     assert context.loop_client.requested == [ArmState.GUIDE]
 
 
-def test_a_foot_that_touches_in_between_has_to_be_still_again(tmp_path):
+def test_a_foot_that_touches_meanwhile_must_be_still_again(tmp_path):
     context = lifted(tmp_path)
     context.loop_client.height = lambda s: 0.0 if 0.19 < s < 0.21 else 0.1
     take_tare(context, TrialName(1, 1))
     assert context.loop_client.advanced == pytest.approx(0.2 + 0.3 + 1.02, abs=0.03)
 
 
-def test_a_force_that_varies_is_tared_again_by_itself(tmp_path, capsys):
+def test_a_tare_with_a_varying_force_is_repeated_automatically(tmp_path, capsys):
     context = lifted(tmp_path)
     context.loop_client.force = lambda s: 3.0 if 0.8 < s < 1.2 else 0.1
     take_tare(context, TrialName(1, 1))
@@ -270,7 +269,7 @@ def test_a_force_that_varies_is_tared_again_by_itself(tmp_path, capsys):
     assert "limit 0.5" in capsys.readouterr().err
 
 
-def test_the_fifth_refused_tare_ends_the_session(tmp_path, capsys):
+def test_too_many_refused_tares_end_the_session(tmp_path, capsys):
     context = lifted(tmp_path)
     context.loop_client.force = lambda s: 3.0 * (s % 0.5)
     with pytest.raises(PreflightError, match="Force varied"):
@@ -280,7 +279,7 @@ def test_the_fifth_refused_tare_ends_the_session(tmp_path, capsys):
     assert events(context, Event.TARED) == []
 
 
-def test_flagged_samples_make_a_poor_tare_and_not_a_moved_foot(tmp_path):
+def test_flagged_samples_are_named_when_a_tare_is_refused(tmp_path):
     context = lifted(tmp_path)
     context.loop_client.is_valid = False
     with pytest.raises(PreflightError, match="flagged"):
@@ -289,7 +288,7 @@ def test_flagged_samples_make_a_poor_tare_and_not_a_moved_foot(tmp_path):
 
 @pytest.mark.parametrize(("limit", "is_taken"), [(0.48, False), (0.50, True)])
 def test_a_tare_that_hides_a_force_of_the_foot_is_refused(tmp_path, limit, is_taken):
-    """50 g too much in the settings are 0.49 N at the sensor."""
+    """A mass set 50 g too high leaves 0.49 N at the sensor."""
     context = lifted(tmp_path, mass=0.05, residual=limit)
     context.loop_client.force = lambda s: 0.0
     if is_taken:
@@ -301,7 +300,7 @@ def test_a_tare_that_hides_a_force_of_the_foot_is_refused(tmp_path, limit, is_ta
 
 
 @pytest.mark.parametrize(("limit", "is_taken"), [(0.5, True), (0.499, False)])
-def test_a_tare_may_hide_as_much_as_the_limit(tmp_path, limit, is_taken):
+def test_a_tare_may_hide_a_force_up_to_the_limit(tmp_path, limit, is_taken):
     context = lifted(tmp_path, residual=limit)
     context.loop_client.force = lambda s: 0.5
     if is_taken:
@@ -318,7 +317,7 @@ def test_the_residual_is_measured_against_the_calibration_of_this_foot(tmp_path)
         take_tare(context, TrialName(1, 1))
 
 
-def test_faults_are_rehearsed_at_every_moment_of_a_tare(tmp_path):
+def test_planned_faults_are_due_at_every_tick_of_a_tare(tmp_path):
     context = lifted(tmp_path)
     due = []
     context.console_loop.faults = SimpleNamespace(
@@ -331,7 +330,7 @@ def test_faults_are_rehearsed_at_every_moment_of_a_tare(tmp_path):
     )
 
 
-def test_the_last_tare_is_written_like_the_others(tmp_path, capsys):
+def test_the_end_tare_is_recorded_in_the_journal(tmp_path, capsys):
     context = lifted(tmp_path)
     take_end_tare(context)
     (event,) = events(context, Event.TARED)
@@ -341,44 +340,44 @@ def test_the_last_tare_is_written_like_the_others(tmp_path, capsys):
     assert asked == {(Prompt.LIFT, 0, 1)}
 
 
-def test_the_last_tare_may_be_left_out(tmp_path, capsys):
+def test_the_end_tare_may_be_left_out(tmp_path, capsys):
     context = lifted(tmp_path, "q")
     take_end_tare(context)
     assert "No tare at the end: left out" in capsys.readouterr().out
 
 
-def test_a_fault_in_the_last_tare_costs_the_bracket_only(tmp_path, capsys):
+def test_a_fault_during_the_end_tare_is_only_reported(tmp_path, capsys):
     context = lifted(tmp_path)
     context.loop_client.status.verdict = GuardVerdict(Action.IDLE, Fault.E_STOP)
     take_end_tare(context)
     assert "No tare at the end: Stop pressed" in capsys.readouterr().out
 
 
-def test_a_last_tare_that_is_refused_costs_the_bracket_only(tmp_path, capsys):
+def test_a_refused_end_tare_is_only_reported(tmp_path, capsys):
     context = lifted(tmp_path)
     context.loop_client.is_valid = False
     take_end_tare(context)
     assert "flagged" in capsys.readouterr().out
 
 
-def test_a_tare_without_a_sensor_says_why_there_is_none(tmp_path, capsys):
+def test_a_tare_without_sensor_data_names_the_cause(tmp_path, capsys):
     context = lifted(tmp_path)
     context.loop_client.is_valid = False
     context.rig.backend.stream = {"trouble": "Another F/T sensor was plugged in: 7."}
     take_end_tare(context)
-    said = capsys.readouterr().out
-    assert "not read at present: Another F/T sensor was plugged in: 7." in said
-    assert "flagged" not in said
+    out = capsys.readouterr().out
+    assert "not read at present: Another F/T sensor was plugged in: 7." in out
+    assert "flagged" not in out
 
 
-def test_other_texts_of_the_settings_are_no_calibration():
+def test_other_settings_files_are_not_read_as_a_calibration():
     text = calibration("tread")["calibration:ft_sensor.toml"]
     assert known_bias({"rig": text}, "tread", is_simulated=False) is None
     container = {"calibration:terrain.toml": "name = 1"}
     assert known_bias(container, "tread", is_simulated=False) is None
 
 
-def test_the_first_fault_of_a_tare_is_due_at_its_beginning(tmp_path):
+def test_planned_faults_of_a_tare_are_due_from_its_start(tmp_path):
     context = lifted(tmp_path)
     due = []
     context.console_loop.faults = SimpleNamespace(
@@ -388,7 +387,7 @@ def test_the_first_fault_of_a_tare_is_due_at_its_beginning(tmp_path):
     assert due[0] == (FaultTrigger.TARE, 4, 0.0)
 
 
-def test_the_journal_has_the_bias_as_the_loop_uses_it(tmp_path):
+def test_the_journal_has_the_bias_that_the_loop_uses(tmp_path):
     context = lifted(tmp_path)
     context.loop_client.force = lambda s: 0.1 + 1.23456e-4 + 0.1003456 * (s > 0.8)
     take_tare(context, TrialName(1, 1))
@@ -400,10 +399,10 @@ def test_the_journal_has_the_bias_as_the_loop_uses_it(tmp_path):
 
 
 class TurnedWrist(LiftedFoot):
-    """An arm that goes where it is sent, with a sensor that weighs its foot.
+    """Arm that moves where it is sent, with a sensor that weighs its foot.
 
     Attributes:
-        seen: what the sensor shows in a pose of the joints [N], shape (3,).
+        seen: force at the sensor [N], shape (3,), by joint positions.
     """
 
     def __init__(self, clock, start, seen):
@@ -438,7 +437,7 @@ class TurnedWrist(LiftedFoot):
 
 
 class Bystander(Keys):
-    """An operator who confirms what is asked for, and waits where nothing is."""
+    """Operator who confirms every request and waits otherwise."""
 
     def answer(self, state):
         self.states.append(state)
@@ -446,7 +445,7 @@ class Bystander(Keys):
 
 
 def wrist(tmp_path, carried, seen, residual=1.0):
-    """Return a context whose arm can turn its wrist, with a calibrated sensor."""
+    """Context whose arm can turn its wrist, with a calibrated sensor."""
     context = make_context(tmp_path, Bystander())
     shipped, rig = load_settings(None), context.rig
     limits = shipped.rig.limits.model_copy(update={"residual": residual})
@@ -466,29 +465,29 @@ def wrist(tmp_path, carried, seen, residual=1.0):
 
 
 def weighed(carried, degrees=0.0):
-    """Return what a sensor shows that was turned about z since it was calibrated."""
+    """Force at a sensor that was turned about z since its calibration, by rotation."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     turned = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
     return lambda rotation: BIAS[:3] + turned @ carried.weight(rotation)[:3]
 
 
-def test_a_mounting_whose_weight_turns_with_the_wrist_is_said_to_be_verified(
-    tmp_path, capsys
-):
+def test_a_mounting_whose_weight_turns_with_the_wrist_is_verified(tmp_path, capsys):
     carried = payload(0.45)
     context = wrist(tmp_path, carried, weighed(carried))
     verify_mounting(context)
-    said = capsys.readouterr().out
-    assert f"{GOOD} mounting verified: 0.0 N off (limit 1.0)" in said
-    assert said.index("clear the space") < said.index("mounting verified")
-    assert said.rstrip().endswith("Take the arm again. [space]")
+    out = capsys.readouterr().out
+    assert f"{GOOD} mounting verified: 0.0 N off (limit 1.0)" in out
+    assert out.index("clear the space") < out.index("mounting verified")
+    assert out.rstrip().endswith("Take the arm again. [space]")
     start = np.array(context.rig.row.start_q)
     assert context.loop_client.position == pytest.approx(start)
 
 
 @pytest.mark.parametrize(("limit", "is_verified"), [(0.5, True), (0.499, False)])
-def test_a_weight_may_be_off_by_the_limit_and_no_more(tmp_path, limit, is_verified):
-    """Of a foot without weight the sensor shows half a newton in the second pose."""
+def test_the_measured_weight_may_be_off_by_the_limit_and_no_more(
+    tmp_path, limit, is_verified
+):
+    """The sensor shows half a newton for a weightless foot in the second pose."""
 
     def seen(rotation):
         is_tilted = rotation[2, 2] > 0.7

@@ -1,4 +1,4 @@
-"""A verdict is repeated on the screen and can be taken back for ten seconds."""
+"""A verdict is repeated on the screen and can be undone for a limited time."""
 
 import json
 
@@ -30,7 +30,7 @@ FIRST = TrialName(1, 1)
 
 
 def judged(data, *keys, opening=None):
-    """Return the context after a first trial got its verdict with `keys[0]`."""
+    """Context after the first trial got its verdict with `keys[0]`."""
     context = make_context(data, Keys(*keys))
     if opening is not None:
         context.journal.append(Event.ENDED, reason="unfinished")
@@ -46,21 +46,21 @@ def judged(data, *keys, opening=None):
     return context
 
 
-def waits(context, prompt=Prompt.LIFT):
-    """Let the undo key be pressed while `prompt` is asked."""
+def press_undo(context, prompt=Prompt.LIFT):
+    """Press the undo key at `prompt`, then judge again."""
     with pytest.raises(UndoRequestedError):
         context.console_loop.tick(prompt, FIRST)
     judge_again(context)
 
 
-def test_a_verdict_is_repeated_and_says_how_it_is_taken_back(tmp_path, capsys):
+def test_a_verdict_is_repeated_with_the_key_that_undoes_it(tmp_path, capsys):
     judged(tmp_path, "k")
     assert "T01 kept. [u] within 10 s takes this back." in capsys.readouterr().out
 
 
-def test_a_kept_trial_becomes_a_rejected_one_and_its_files_follow(tmp_path, capsys):
+def test_an_undone_keep_can_become_a_rejection_that_moves_the_files(tmp_path, capsys):
     context = judged(tmp_path, "k", "u", "r2")
-    waits(context)
+    press_undo(context)
     state, folder = context.journal.state, context.metadata.folder
     assert (state.kept, state.rejected, state.next_trial) == ((), 1, 1)
     assert (folder.rejected / "T01a.mcap").read_bytes() == b"recording"
@@ -71,19 +71,19 @@ def test_a_kept_trial_becomes_a_rejected_one_and_its_files_follow(tmp_path, caps
     assert "T01 rejected: too fast" in capsys.readouterr().out
 
 
-def test_a_rejected_trial_becomes_a_kept_one(tmp_path):
+def test_an_undone_rejection_can_become_a_keep(tmp_path):
     context = judged(tmp_path, "r4", "u", "k")
-    waits(context)
+    press_undo(context)
     state, folder = context.journal.state, context.metadata.folder
     assert (state.kept, state.rejected, state.next_trial) == ((1,), 0, 2)
     assert (folder.trials / "T01.mcap").read_bytes() == b"recording"
     assert replay(folder.events()) == state
 
 
-def test_the_new_verdict_can_be_taken_back_too(tmp_path):
+def test_the_new_verdict_can_be_undone_too(tmp_path):
     context = judged(tmp_path, "k", "u", "r2", "u", "k")
-    waits(context)
-    waits(context)
+    press_undo(context)
+    press_undo(context)
     assert context.journal.state.kept == (1,)
     kinds = [event["event"] for event in context.metadata.folder.events()]
     assert kinds[-3:] == ["trial-kept", "verdict-changed", "verdict-changed"]
@@ -92,19 +92,19 @@ def test_the_new_verdict_can_be_taken_back_too(tmp_path):
 def test_the_same_verdict_again_changes_nothing(tmp_path):
     context = judged(tmp_path, "k", "u", "k")
     before = context.metadata.folder.events()
-    waits(context)
+    press_undo(context)
     assert context.metadata.folder.events() == before
 
 
-def test_a_session_that_ends_while_it_is_judged_again_keeps_what_was_given(tmp_path):
+def test_quit_while_judging_again_leaves_the_first_verdict(tmp_path):
     context = judged(tmp_path, "k", "u", "q")
     with pytest.raises(StopRequestedError):
-        waits(context)
+        press_undo(context)
     assert context.journal.state.kept == (1,)
     assert (context.metadata.folder.trials / "T01.mcap").exists()
 
 
-def test_a_repeated_trial_whose_verdict_is_taken_back_is_to_be_repeated_again(
+def test_undoing_the_verdict_of_a_redo_reopens_the_redo(
     tmp_path,
 ):
     context = make_context(tmp_path, Keys("k"))
@@ -127,7 +127,7 @@ def test_a_repeated_trial_whose_verdict_is_taken_back_is_to_be_repeated_again(
     assert context.journal.state.is_over
 
 
-def test_after_ten_seconds_nothing_is_taken_back(tmp_path, capsys):
+def test_a_verdict_cannot_be_undone_after_the_time_limit(tmp_path, capsys):
     context = judged(tmp_path, "k", *[""] * round(UNDO_NS * 1e-9 / TICK), "u")
     while context.operator.keys:
         context.console_loop.tick(Prompt.LIFT, FIRST)
@@ -135,38 +135,38 @@ def test_after_ten_seconds_nothing_is_taken_back(tmp_path, capsys):
     assert context.journal.state.kept == (1,)
 
 
-def test_before_the_first_verdict_the_key_means_nothing(tmp_path, capsys):
+def test_the_undo_key_does_nothing_before_the_first_verdict(tmp_path, capsys):
     wait_ready(make_context(tmp_path, Keys("u", " ")), FIRST)
     assert "No verdict to take back" in capsys.readouterr().out
 
 
 @pytest.mark.slow
-def test_a_script_takes_a_verdict_back_in_a_whole_session(tmp_path, config):
+def test_a_script_undoes_a_verdict_in_a_whole_session(tmp_path, config):
     script = tmp_path / "script.txt"
     script.write_text("keep\nundo\nredo 2\nkeep\n")
     done = run_short(config, tmp_path / "data", "TF", 1, "--operator-script", script)
     assert done.code == 0, done.err
     folder = only_session(tmp_path / "data")
-    told = [
+    verdicts = [
         e for e in journal(folder) if e["event"] in {"trial-kept", "verdict-changed"}
     ]
-    assert [(e["event"], e["attempt"]) for e in told] == [
+    assert [(e["event"], e["attempt"]) for e in verdicts] == [
         ("trial-kept", 1),
         ("verdict-changed", 1),
         ("trial-kept", 2),
     ]
-    assert {e["who"] for e in told} == {"script"}
+    assert {e["who"] for e in verdicts} == {"script"}
     assert sorted(p.name for p in (folder / "trials").glob("*.mcap"))[0] == "T01.mcap"
     assert (folder / "rejected" / "T01a.mcap").exists()
     assert "T01 kept: this stands until you give another verdict." in done.out
 
 
 def broken():
-    """Fail as a loop does whose process died."""
+    """Fail like a loop whose process died."""
     raise DeviceFaultError("The recorder ended.")
 
 
-def test_a_fault_at_the_end_is_told_once_and_takes_no_time_from_undo(tmp_path, capsys):
+def test_a_fault_at_the_end_is_reported_once_and_does_not_end_undo(tmp_path, capsys):
     context = judged(tmp_path, "k", "", "", "", "u")
     context.loop_client.status.verdict = GuardVerdict(Action.IDLE, Fault.E_STOP)
     with pytest.raises(UndoRequestedError):
@@ -174,7 +174,7 @@ def test_a_fault_at_the_end_is_told_once_and_takes_no_time_from_undo(tmp_path, c
     assert capsys.readouterr().out.count("▲ Stop pressed") == 1
 
 
-def test_what_fails_at_the_end_is_told_and_ends_the_wait(tmp_path, capsys):
+def test_a_device_failure_at_the_end_is_reported_and_ends_the_wait(tmp_path, capsys):
     context = judged(tmp_path, "k")
     context.loop_client.on_advance.append(broken)
     await_undo(context)
@@ -183,14 +183,14 @@ def test_what_fails_at_the_end_is_told_and_ends_the_wait(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("key", [" ", "q"])
-def test_a_key_ends_the_wait_at_the_end(tmp_path, key):
+def test_another_key_ends_the_wait_for_undo(tmp_path, key):
     context = judged(tmp_path, "k", key)
     await_undo(context)
     assert UNDO_NS * 1e-9 - context.console_loop.undo_left < 2.0 * TICK
 
 
 @pytest.mark.slow
-def test_a_person_can_take_the_last_verdict_back(tmp_path, config, monkeypatch):
+def test_a_person_can_undo_the_last_verdict(tmp_path, config, monkeypatch):
     monkeypatch.setattr(AutoOperator, "who", "mk")
     pressed = []
 
@@ -203,10 +203,10 @@ def test_a_person_can_take_the_last_verdict_back(tmp_path, config, monkeypatch):
 
     watched = run_watched(config, tmp_path / "data", 1, press=press)
     assert watched.done.code == 0, watched.done.err
-    told = [
+    verdicts = [
         e for e in journal(watched.folder) if "verdict" in e or "kept" in e["event"]
     ]
-    assert [(e["event"], e["attempt"], e["who"]) for e in told] == [
+    assert [(e["event"], e["attempt"], e["who"]) for e in verdicts] == [
         ("trial-kept", 1, "mk"),
         ("verdict-changed", 1, "mk"),
         ("trial-kept", 2, "mk"),

@@ -1,4 +1,4 @@
-"""A day at the arm: redos, a pause, notes, a fault and a kill, and it all agrees."""
+"""Status, journal and files agree after redos, a pause, notes, a fault and a kill."""
 
 import json
 import os
@@ -25,7 +25,7 @@ FAST = ("--fake", "--fast")
 
 
 def write_scripts(folder, trials, killed_in):
-    """Return the scripts before and after the kill in trial `killed_in`."""
+    """Scripts before and after the kill in trial `killed_in`."""
     before, after = folder / "before.txt", folder / "after.txt"
     keeps = "keep\n" * trials
     before.write_text(f"note raked twice\nredo 2\nkeep\npause\n{keeps}")
@@ -35,7 +35,7 @@ def write_scripts(folder, trials, killed_in):
 
 
 def in_a_child(*arguments):
-    """Run a command in a copy of this process; return the signal that ended it."""
+    """Run a command in a fork; the signal that ended the fork, or 0."""
     child = os.fork()
     if child == 0:
         try:
@@ -51,7 +51,7 @@ def digests(folder):
 
 
 def shorten(monkeypatch):
-    """Let every push end by key before the foot has crossed the container, at once."""
+    """End every push by key soon, before the foot has crossed the container."""
     for module in ("auto_operator", "scripted"):
         monkeypatch.setattr(f"experiments.operator.{module}.READY_SECONDS", 0.1)
     usual = AutoOperator.answer
@@ -71,7 +71,7 @@ def shorten(monkeypatch):
         pytest.param(10, 6, marks=[pytest.mark.long, pytest.mark.timeout(600)]),
     ],
 )
-def test_board_journal_and_files_of_an_eventful_session_agree(
+def test_status_journal_and_files_of_an_eventful_session_agree(
     config, tmp_path, monkeypatch, trials, killed_in
 ):
     if trials < 10:
@@ -129,8 +129,8 @@ def check_files(folder, names, killed_in):
         f"{killed}b": "sensor",
     }
     rejected = folder / "rejected"
-    found = {p.stem: sidecar(p)["reason"] for p in rejected.glob("T???.json")}
-    assert found == reasons
+    stated = {p.stem: sidecar(p)["reason"] for p in rejected.glob("T???.json")}
+    assert stated == reasons
     for name in reasons:
         path = rejected / f"{name}.mcap"
         assert sidecar(path)["sha256"] == digest(path)
@@ -140,7 +140,7 @@ def check_files(folder, names, killed_in):
     assert note["text"] == "stone in the tread"
 
 
-def test_a_broken_neighbour_does_not_cost_a_complete_session_its_exit_code(
+def test_an_unreadable_other_session_does_not_fail_a_complete_one(
     tmp_path, config, monkeypatch
 ):
     def refuse(*_, **__):
