@@ -554,8 +554,8 @@ ROWS: dict[str, dict[str, Fields]] = {
             "a second program on this computer is refused by the lock",
             (
                 _MATRIX,
-                "tests/experiments/commands/test_shared_arm.py::test_an_arm_that_another_program_has_is_not_opened",
-                "tests/experiments/commands/test_shared_arm.py::test_another_master_is_heard_and_nothing_is_sent_to_its_arm",
+                "tests/experiments/commands/test_shared_arm.py::test_an_arm_locked_by_another_program_is_not_opened",
+                "tests/experiments/commands/test_shared_arm.py::test_nothing_is_sent_to_the_arm_of_another_master",
             ),
         ),
         "late": (
@@ -659,7 +659,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "",
             (
                 _MATRIX,
-                "tests/experiments/commands/test_shared_arm.py::test_an_arm_that_another_program_has_is_not_opened",
+                "tests/experiments/commands/test_shared_arm.py::test_an_arm_locked_by_another_program_is_not_opened",
             ),
         ),
         "late": (
@@ -670,7 +670,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "nothing is sent but the question",
             (
-                "tests/experiments/commands/test_shared_arm.py::test_an_active_arm_is_asked_for_its_mode_and_left_active",
+                "tests/experiments/commands/test_shared_arm.py::test_an_active_arm_is_only_asked_for_its_mode",
             ),
         ),
     },
@@ -738,7 +738,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "before the first torque",
             (
-                "tests/experiments/commands/test_help_and_messages.py::test_a_message_is_told_with_its_code_and_nothing_earlier_is_touched",
+                "tests/experiments/commands/test_help_and_messages.py::test_a_message_has_its_exit_code_and_earlier_trials_stay_unchanged",
             ),
         ),
         "stuck": (
@@ -854,7 +854,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "nothing is started",
             (
-                "tests/experiments/commands/test_help_and_messages.py::test_a_message_is_told_with_its_code_and_nothing_earlier_is_touched",
+                "tests/experiments/commands/test_help_and_messages.py::test_a_message_has_its_exit_code_and_earlier_trials_stay_unchanged",
             ),
         ),
         "stuck": (

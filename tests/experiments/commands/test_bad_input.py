@@ -22,7 +22,7 @@ FAKE = ("--fake", "--fast", "--operator-script", "auto")
 
 
 def refusal(done, code=2):
-    """Return the one line that a command was refused with."""
+    """The single line with which a command was refused."""
     assert done.code == code, done.err
     (line,) = done.err.splitlines()
     return line
@@ -48,7 +48,7 @@ SIMULATED = "--fast, --processes, --fault and --operator-script work only with"
         (("TF", *FAKE, "--config", "/no/rig.toml"), "/no/rig.toml cannot be read (No"),
     ],
 )
-def test_a_run_that_cannot_be_is_refused(tmp_path, arguments, text):
+def test_an_impossible_run_is_refused(tmp_path, arguments, text):
     done = traction("run", *arguments, "--data", tmp_path / "data")
     assert refusal(done).startswith(text)
     assert done.err.rstrip().endswith("Nothing was started.")
@@ -79,7 +79,7 @@ def test_a_bad_line_of_an_operator_script_is_named(config, tmp_path, line, text)
     assert text in refusal(done)
 
 
-def test_an_operator_script_that_is_no_text_is_refused(config, tmp_path):
+def test_an_operator_script_that_is_not_text_is_refused(config, tmp_path):
     script = tmp_path / "script.txt"
     script.write_bytes(b"\xff\xfe\x00")
     done = run_short(config, tmp_path / "data", "TF", 1, "--operator-script", script)
@@ -99,7 +99,7 @@ def test_a_stop_pressed_before_the_start_is_a_failed_preflight(config, tmp_path)
     assert not (tmp_path / "data").exists()
 
 
-def test_too_little_room_on_the_disk_is_a_failed_preflight(tmp_path):
+def test_too_little_disk_space_is_a_failed_preflight(tmp_path):
     config = write_config(tmp_path, rig=("free_disk_gb = 5.0", "free_disk_gb = 1e5"))
     done = run_short(config, tmp_path / "data")
     assert "GB free, a session needs 0.9 GB, minimum 100000 GB." in done.err
@@ -229,19 +229,19 @@ def test_every_wrong_setting_is_named_with_its_line(tmp_path):
         (("check", "--explain", "pucks-silent"), "puck-silent"),
     ],
 )
-def test_what_was_probably_meant_is_asked(tmp_path, arguments, meant):
+def test_the_nearest_name_is_suggested_for_a_misspelt_one(tmp_path, arguments, meant):
     done = traction(*arguments, "--data", tmp_path)
     assert done.code == 2
     assert f"Did you mean {meant}?" in done.err
 
 
-def test_nothing_is_asked_where_no_name_is_near(tmp_path):
+def test_no_name_is_suggested_where_none_is_near(tmp_path):
     done = traction("run", "meadow", "--fake", "--data", tmp_path)
     assert done.code == 2
     assert "Did you mean" not in done.err
 
 
-def test_settings_that_are_no_text_are_refused(tmp_path):
+def test_settings_that_are_not_text_are_refused(tmp_path):
     config = tmp_path / "rig.toml"
     config.write_bytes(b"\xff\x00\xff")
     done = traction("status", "--config", config)
@@ -253,7 +253,7 @@ def test_settings_that_are_no_text_are_refused(tmp_path):
 
 @pytest.fixture
 def copied(recorded, tmp_path):
-    """Return a data folder with a copy of the session that may be damaged."""
+    """A data folder with a copy of the session that tests may damage."""
     data = tmp_path / "data"
     shutil.copytree(recorded.data, data)
     for path in data.rglob("*.mcap"):
@@ -261,8 +261,8 @@ def copied(recorded, tmp_path):
     return data
 
 
-def vouch_for(path):
-    """Let sidecar and journal state the checksum of the file as it is now."""
+def update_checksums(path):
+    """Make sidecar and journal state the present checksum of the file."""
     now = {"sha256": digest(path), "size": path.stat().st_size}
     write_json(path.with_suffix(".json"), sidecar(path) | now)
     journal = path.parents[1] / "events.jsonl"
@@ -278,7 +278,7 @@ def vouch_for(path):
     journal.write_bytes(b"".join(lines))
 
 
-def test_a_report_of_nothing_is_refused(tmp_path):
+def test_a_report_without_sessions_or_trials_is_refused(tmp_path):
     assert "Name the sessions to report, or use --all." in refusal(
         traction("report", "--data", tmp_path)
     )
@@ -287,13 +287,13 @@ def test_a_report_of_nothing_is_refused(tmp_path):
     )
 
 
-def test_a_report_of_a_session_that_is_not_there_names_those_that_are(recorded):
+def test_a_report_of_a_missing_session_names_the_existing_ones(recorded):
     done = traction("report", "S007", "--data", recorded.data)
     assert "There is no session 'S007'" in refusal(done)
     assert "Sessions: S001." in done.err
 
 
-def test_a_name_that_no_file_can_have_is_no_session(tmp_path):
+def test_an_overlong_session_name_is_refused(tmp_path):
     done = traction("report", "S" * 400, "--data", tmp_path)
     assert "There is no session" in refusal(done)
 
@@ -310,12 +310,12 @@ def test_trials_that_changed_since_they_were_kept_are_not_reported(copied):
 
 
 def test_damaged_trials_are_left_out_and_named(copied):
-    """Even if somebody made the checksum right again."""
+    """Even if the checksums were updated after the damage."""
     for path in only_session(copied).glob("trials/T0?.mcap"):
         data = bytearray(path.read_bytes())
         data[len(data) // 2] ^= 0x10
         path.write_bytes(data)
-        vouch_for(path)
+        update_checksums(path)
     done = traction("report", "S001", "--data", copied)
     assert refusal(done) == "S001: no kept trials to report."
     assert done.out.count("▲ left out: ") == 2
@@ -328,7 +328,7 @@ def test_a_foreign_file_among_the_trials_is_left_out_and_named(copied):
             writer = Writer(file)
             writer.start(profile="ros2", library="somebody")
             writer.finish()
-        vouch_for(path)
+        update_checksums(path)
     done = traction("report", "S001", "--data", copied)
     assert refusal(done) == "S001: no kept trials to report."
     assert done.out.count("▲ left out: ") == 2
@@ -344,7 +344,7 @@ def test_live_and_simulated_sessions_do_not_mix(copied):
 
 
 @pytest.mark.parametrize("seed", ["-1", "x", "1" * 30])
-def test_a_seed_that_is_no_number_is_a_usage_error(tmp_path, seed):
+def test_an_invalid_seed_is_a_usage_error(tmp_path, seed):
     done = traction("report", "--all", "--points-seed", seed, "--data", tmp_path)
     assert done.code == 2
     assert "expected a whole number >= 0, e.g. 1" in done.err.splitlines()[-1]
@@ -398,17 +398,17 @@ def test_a_fit_into_a_folder_that_is_a_file_is_refused(tmp_path):
     assert occupied.read_text() == "precious"
 
 
-def test_a_fit_with_a_strange_list_of_columns_is_refused(tmp_path):
+def test_a_fit_with_an_invalid_list_of_columns_is_refused(tmp_path):
     done = traction(
         "fit", tmp_path / "t.csv", "--to", tmp_path, "--columns", "t=a,speed=b"
     )
     assert "'speed=b' does not name a column" in refusal(done)
 
 
-# --- a session that is empty ----------------------------------------------------------
+# --- an empty session -----------------------------------------------------------------
 
 
-def test_a_session_without_trials_is_no_report(tmp_path):
+def test_a_report_of_a_session_without_trials_is_refused(tmp_path):
     create_session(tmp_path, "TF", is_simulated=True, utc_ns=0)
     done = traction("report", "S001", "--data", tmp_path)
     assert refusal(done) == "S001: no kept trials to report."

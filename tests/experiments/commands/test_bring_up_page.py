@@ -1,4 +1,4 @@
-"""What the pages on the first hour and on a served arm say is what the program says."""
+"""The pages on bring-up and on a served arm quote the program exactly."""
 
 import re
 import shlex
@@ -38,7 +38,7 @@ def blocks(page):
 
 
 def commands(page, program):
-    """Return the commands of a program, without what it prints."""
+    """Command lines of a program on a page, without its output."""
     lines = [line for block in blocks(page) for line in block.splitlines()]
     return [
         line for line in lines if line.startswith(f"{program} ") and "  " not in line
@@ -46,13 +46,13 @@ def commands(page, program):
 
 
 def rows(page):
-    """Return the cells of every row of every table."""
+    """Cells of every row of every table."""
     lines = [line for line in page.splitlines() if line.startswith("| ")]
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
 
 
 def frames():
-    """Return (frame, words) of every row that shows a frame, in order."""
+    """(frame, words) of every row that shows a frame, in order."""
     for cells in rows(PAGE):
         for frame, words in pairwise(cells):
             if re.fullmatch(r"`[0-9A-F]+#[0-9A-F]*`", frame):
@@ -61,16 +61,16 @@ def frames():
 
 def test_every_frame_decodes_to_its_words():
     reader = BusReader()
-    said = []
+    raw = []
     for number, (frame, _) in enumerate(frames()):
         (logged,) = parse_log([f"({1e-4 * number:.6f}) can0 {frame}"], print)
-        said.append(reader.read(logged)[-1].text)
-    told = [re.sub(r", (LATE: )?\d+ us after the question$", "", text) for text in said]
-    assert told == [words for _, words in frames()]
-    assert len(told) > 50
+        raw.append(reader.read(logged)[-1].text)
+    texts = [re.sub(r", (LATE: )?\d+ us after the question$", "", text) for text in raw]
+    assert texts == [words for _, words in frames()]
+    assert len(texts) > 50
 
 
-def test_every_identifier_has_its_words():
+def test_every_identifier_is_described_as_on_the_page():
     shown = [
         (match[1], cells[1])
         for cells in rows(PAGE)
@@ -83,9 +83,9 @@ def test_every_identifier_has_its_words():
 
 @pytest.mark.parametrize("page", PAGES)
 def test_every_command_of_a_page_is_understood(page):
-    found = commands(PAGES[page], "traction")
-    assert found
-    for line in found:
+    lines = commands(PAGES[page], "traction")
+    assert lines
+    for line in lines:
         arguments = shlex.split(line.removesuffix("&"))[1:]
         assert build_parser().parse_args(arguments).command == arguments[0]
 
@@ -95,7 +95,7 @@ def test_every_command_in_a_sentence_exists(page):
     assert set(re.findall(r"`traction (\w+)", PAGES[page])) <= set(COMMANDS)
 
 
-def test_the_unit_of_the_service_starts_what_exists():
+def test_the_service_unit_starts_an_existing_command():
     (start,) = re.findall(r"^ExecStart=(.*)$", PAGES["served-arm.md"], re.MULTILINE)
     program, *arguments = shlex.split(start)
     assert program.endswith("/bin/traction")
@@ -103,28 +103,28 @@ def test_the_unit_of_the_service_starts_what_exists():
     assert (args.command, args.bare, args.idle_first) == ("fake", True, True)
 
 
-def test_the_options_of_a_served_arm_are_those_of_the_page(capsys):
+def test_every_option_on_the_page_of_a_served_arm_exists(capsys):
     with pytest.raises(SystemExit):
         build_parser().parse_args(["fake", "--help"])
     known = set(re.findall(r"--[a-z-]+", capsys.readouterr().out))
     assert set(re.findall(r"`(--[a-z-]+)", PAGES["served-arm.md"])) <= known
 
 
-def test_an_interface_is_set_up_by_the_same_words_everywhere():
+def test_the_command_that_sets_up_an_interface_is_the_same_everywhere():
     can = load_settings(None).rig.can
     setup = setup_command(can.channel, can.bitrate)
     assert setup in commands(PAGE, "ip")
     do = CATALOGUE["can-down"].do
     assert setup in do.format(channel=can.channel, bitrate=can.bitrate)
     for page in (ROOT / "docs").glob("*.md"):
-        told = re.findall(
+        texts = re.findall(
             r"ip link set \S+ up [^\n`|]*type can[^\n`|]*", page.read_text()
         )
-        assert {text.strip() for text in told} <= {setup}, page.name
+        assert {text.strip() for text in texts} <= {setup}, page.name
 
 
 def refusal(options=None, silent=()):
-    """Return what the start says of an arm."""
+    """Message with which the start refuses an arm."""
     rig = Rig(options)
     for node in silent:
         rig.network.silence(node)
@@ -135,18 +135,18 @@ def refusal(options=None, silent=()):
 
 REFUSALS = {
     "E-stop": (NetworkOptions(safety_mode=SafetyMode.E_STOP), ()),
-    "nobody": (None, (*range(1, 8), 10)),
-    "one puck": (None, (5,)),
-    "no wrist": (None, (5, 6, 7)),
+    "no node answers": (None, (*range(1, 8), 10)),
+    "one puck silent": (None, (5,)),
+    "wrist silent": (None, (5, 6, 7)),
 }
 
 
 @pytest.mark.parametrize("what", REFUSALS)
-def test_a_refusal_is_quoted_as_it_is(what):
+def test_every_refusal_of_the_start_is_quoted(what):
     assert f"`{refusal(*REFUSALS[what])}`" in PAGE
 
 
-def test_a_bus_on_which_nobody_acknowledges_is_quoted():
+def test_the_message_about_missing_acknowledgement_is_quoted():
     rig = Rig()
     rig.network.faults.stop_acknowledging()
     with pytest.raises(PreflightError) as caught:
@@ -154,31 +154,31 @@ def test_a_bus_on_which_nobody_acknowledges_is_quoted():
     assert f"`{caught.value.message}`" in PAGE
 
 
-def test_an_arm_that_is_not_zeroed_is_quoted():
+def test_the_message_about_an_arm_that_is_not_zeroed_is_quoted():
     assert f"`{CATALOGUE['not-zeroed'].what}`" in PAGE
 
 
-def test_a_silent_bus_looks_as_on_the_page(tmp_path):
+def test_the_output_for_a_silent_bus_is_on_the_page(tmp_path):
     (head, *lines) = listen(tmp_path).out.splitlines()
     assert head.endswith("nothing is sent")
     assert all(line in PAGE for line in lines)
     assert len(lines) == 3
 
 
-def test_another_master_looks_as_on_the_page(tmp_path):
+def test_the_output_for_another_master_is_on_the_page(tmp_path):
     out = listen(tmp_path, 0x00A, 0x404).out
     (line,) = [line for line in out.splitlines() if "another program" in line]
     assert line in PAGE
 
 
-def test_zeroing_looks_as_on_the_page():
+def test_the_output_of_zeroing_is_on_the_page():
     done = traction("zero", "--fake", "--yes")
     lines = [line for line in done.out.splitlines() if "mech_at_home" not in line]
     assert len(lines) == 3
     assert all(line in PAGE for line in lines)
 
 
-def test_a_joint_that_is_turned_changes_the_positions_of_the_page():
+def test_the_puck_positions_of_a_turned_joint_are_those_of_the_page():
     transmission = Transmission(CONSTANTS.j2mp, CONSTANTS.cts, CONSTANTS.ipnm)
     shown = [cells for cells in rows(PAGE) if re.match(r"J\d", cells[0])]
     assert [cells[0][:2] for cells in shown] == [f"J{joint}" for joint in range(1, 8)]

@@ -1,4 +1,4 @@
-"""`traction check --bus`: who says what on a bus, and nothing is sent."""
+"""`traction check --bus` names the traffic on a bus and sends nothing."""
 
 import threading
 from pathlib import Path
@@ -29,17 +29,17 @@ from wam.bus.transports import PythonCanTransport
         (0x7FF, "node 31 to group 31"),
     ],
 )
-def test_an_identifier_is_put_into_words(can_id, words):
+def test_an_identifier_is_described(can_id, words):
     assert describe_id(can_id) == words
 
 
-def test_every_identifier_has_words():
+def test_every_identifier_has_a_description():
     assert all(describe_id(can_id) for can_id in range(0x800))
 
 
 def test_the_load_of_a_bus_follows_from_its_frames():
     traffic = BusTraffic()
-    # A cycle of the arm: question, seven positions, two torques, 500 times a second.
+    # A cycle of the arm: request, seven positions, two torques, 500 times a second.
     cycle = [(0x404, b"\x30", 0.0), *[(0x463, bytes(3), 0.0)] * 7]
     cycle += [(0x401, bytes(8), 0.0)] * 2
     for _ in range(500):
@@ -49,7 +49,7 @@ def test_the_load_of_a_bus_follows_from_its_frames():
 
 
 class Talker:
-    """A hub whose network says a frame of puck 3 again and again."""
+    """A hub that sends a frame of each identifier every 5 ms."""
 
     def __init__(self, path: Path, ids: tuple[int, ...]) -> None:
         self._hub, self._ids, self._is_on = SocketHub(path), ids, True
@@ -83,7 +83,7 @@ def listen(tmp_path, *ids):
     return done
 
 
-def test_who_talks_is_told_with_its_rate(tmp_path):
+def test_traffic_is_listed_with_sender_and_rate(tmp_path):
     done = listen(tmp_path, 0x463)
     assert done.code == 0
     assert "puck 3 reports its position" in done.out
@@ -92,17 +92,17 @@ def test_who_talks_is_told_with_its_rate(tmp_path):
     assert "another program" not in done.out
 
 
-def test_another_master_is_told(tmp_path):
+def test_another_master_is_reported(tmp_path):
     done = listen(tmp_path, 0x463, 0x404)
     assert "another program drives the arm: 404" in done.out
 
 
-def test_a_silent_bus_is_told(tmp_path):
+def test_a_silent_bus_is_reported(tmp_path):
     assert "silent, as an arm is while no host polls it" in listen(tmp_path).out
 
 
 class DeafBus(can.BusABC):
-    """A bus whose controller reports that nobody acknowledges, then breaks."""
+    """A bus whose controller reports missing acknowledgement, or that is broken."""
 
     channel_info = "deaf"
 
@@ -135,7 +135,7 @@ def served_by(monkeypatch):
     return serve
 
 
-def test_what_the_controller_reports_is_told_with_what_it_means(served_by):
+def test_an_error_frame_of_the_controller_is_reported_with_its_meaning(served_by):
     served_by(DeafBus())
     done = traction("check", "--bus", 0.1)
     assert "passive 1. No device on the CAN bus acknowledges." in done.out
@@ -155,5 +155,5 @@ def test_a_simulated_bus_cannot_be_listened_to():
 
 
 @pytest.mark.parametrize("seconds", ["0", "-1", "nan", "1e9", "soon"])
-def test_a_time_that_makes_no_sense_is_refused(seconds):
+def test_an_invalid_listening_time_is_refused(seconds):
     assert traction("check", f"--bus={seconds}").code == 2

@@ -1,4 +1,4 @@
-"""The page of `traction check` for a program."""
+"""`traction check --json` prints the page of the preflight for programs."""
 
 import json
 
@@ -21,7 +21,7 @@ def test_the_page_of_a_fit_rig_is_json_and_nothing_else(tmp_path):
     assert page["software"]["commit"]
 
 
-def test_a_refused_rig_is_json_too_and_every_check_that_failed_is_in_it(tmp_path):
+def test_the_page_of_a_refused_rig_is_json_with_its_failed_checks(tmp_path):
     change = ('"socketcan"', '"no-such-adapter"')
     config = write_config(tmp_path, rig=change)
     done = traction("check", "--json", "--config", config, "--data", tmp_path)
@@ -36,7 +36,7 @@ def test_a_refused_rig_is_json_too_and_every_check_that_failed_is_in_it(tmp_path
 @pytest.mark.parametrize(
     "other", [("--explain", "all"), ("--config-only",), ("--bus", "1")]
 )
-def test_what_is_no_page_is_not_printed_as_one(tmp_path, other):
+def test_json_is_refused_with_options_that_print_no_page(tmp_path, other):
     done = traction("check", "--json", *other, "--data", tmp_path)
     assert (done.code, done.out) == (2, "")
     assert "--json" in done.err

@@ -1,4 +1,4 @@
-"""The first day by the command, simulated: what is found where, kept, rechecked."""
+"""The first steps of `traction commission` are recorded, rechecked and not repeated."""
 
 import json
 
@@ -13,7 +13,7 @@ FIRST = ("--fake", "--fast", "--operator-script", "auto", "--until", "C1")
 
 @pytest.fixture
 def kept(tmp_path):
-    """Return the folder of a record of two steps."""
+    """The folder of a record of two steps."""
     config = write_config(tmp_path)
     done = traction("commission", *FIRST, "--config", config)
     assert done.code == 0, done.err
@@ -25,7 +25,7 @@ def recheck(folder):
     return traction("commission", *options)
 
 
-def test_what_was_done_is_kept_and_not_done_again(kept):
+def test_finished_steps_are_recorded_and_not_repeated(kept):
     record = read_commissioning(kept)
     assert [done.step for done in record.steps] == ["C0", "C1"]
     assert record.is_simulated
@@ -34,15 +34,15 @@ def test_what_was_done_is_kept_and_not_done_again(kept):
     assert read_commissioning(kept) == record
 
 
-def test_an_arm_that_was_moved_begins_again(kept):
+def test_the_commissioning_of_a_moved_arm_begins_again(kept):
     before = read_commissioning(kept)
     config = kept.parent / "rig.toml"
     done = traction("commission", *FIRST, "--moved", "--config", config)
     assert done.code == 0, done.err
     record = read_commissioning(kept)
     assert list(record.told) == ["mounting"]
-    assert [one.step for one in record.steps] == ["C0", "C1"]
-    assert all(one not in before.steps for one in record.steps)
+    assert [entry.step for entry in record.steps] == ["C0", "C1"]
+    assert all(entry not in before.steps for entry in record.steps)
 
 
 def test_the_catalogue_of_wrong_rigs_is_listed():
@@ -50,7 +50,7 @@ def test_the_catalogue_of_wrong_rigs_is_listed():
     assert (done.code, "motor-3-reversed" in done.out) == (0, True)
 
 
-def test_what_was_recorded_is_judged_again(kept):
+def test_a_recheck_of_the_recordings_leaves_the_record_unchanged(kept):
     before = read_commissioning(kept)
     done = recheck(kept)
     assert done.code == 0, done.err
@@ -58,7 +58,7 @@ def test_what_was_recorded_is_judged_again(kept):
     assert read_commissioning(kept) == before
 
 
-def test_a_recording_that_was_changed_is_not_judged(kept):
+def test_a_changed_recording_is_not_rechecked(kept):
     raw = read_commissioning(kept).steps[1].raw[0]
     (kept / raw.file).write_bytes(b"other")
     done = recheck(kept)
@@ -66,7 +66,7 @@ def test_a_recording_that_was_changed_is_not_judged(kept):
     assert "not what was recorded" in done.err
 
 
-def test_a_record_that_was_edited_is_not_gone_on_with(kept):
+def test_an_edited_record_is_refused(kept):
     content = json.loads((kept / NAME).read_text())
     content["steps"][0]["operator"] = "another"
     (kept / NAME).write_text(json.dumps(content))
@@ -76,18 +76,18 @@ def test_a_record_that_was_edited_is_not_gone_on_with(kept):
 
 
 @pytest.mark.slow
-def test_a_puck_that_was_replaced_is_noticed_until_it_is_begun_anew(tmp_path):
+def test_a_replaced_puck_is_refused_until_commissioning_begins_anew(tmp_path):
     config, kept = write_config(tmp_path), tmp_path / FAKE_FOLDER
     options = ("commission", *FIRST[:-1], "C2", "--config", config)
     assert traction(*options).code == 0
     other = (*options, "--wrong", "one-puck-replaced", "--from", "C2")
-    for _ in range(2):  # doing it again makes it no better
+    for _ in range(2):  # a repetition is refused too
         done = traction(*other)
         assert done.code == 3
         assert "SN of puck 3 is 2003, it was 1003" in done.out
         assert "move commissioning.json away" in " ".join(done.out.split())
     (kept / NAME).unlink()
-    assert traction(*other).code == 0  # this is its arm from now on
+    assert traction(*other).code == 0  # a new record accepts the new puck
 
 
 @pytest.mark.parametrize(
@@ -97,7 +97,7 @@ def test_a_puck_that_was_replaced_is_noticed_until_it_is_begun_anew(tmp_path):
         pytest.param("", "", marks=pytest.mark.slow),
     ],
 )
-def test_what_is_unusual_is_said_and_passes(tmp_path, wrong, words):
+def test_an_unusual_value_gives_a_warning_and_passes(tmp_path, wrong, words):
     options = ("commission", *FIRST[:-1], "C2", "--config", write_config(tmp_path))
     done = traction(*options, *(("--wrong", wrong) if wrong else ()))
     assert done.code == 0, done.err

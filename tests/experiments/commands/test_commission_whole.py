@@ -1,4 +1,4 @@
-"""A whole first day by the command, simulated: every step, the end, and going on."""
+"""A whole simulated first day of `traction commission`, and the daily checks after."""
 
 import pytest
 
@@ -19,16 +19,16 @@ NAMES = ("--operator", "Ada")
 
 
 def commission(folder, *more):
-    """Go on with what is due."""
+    """Continue with the steps that are due."""
     config = folder / "rig.toml"
     return traction("commission", *OPTIONS, "--config", config, *more)
 
 
 @pytest.fixture(scope="module")
 def day(tmp_path_factory):
-    """Return the folder of a sound arm that was commissioned in one run."""
+    """The folder of a sound arm commissioned in one run, and the command's result."""
     folder = tmp_path_factory.mktemp("day")
-    write_config(folder, travel=0.45)  # whose corners can be told apart
+    write_config(folder, travel=0.45)  # long enough to distinguish its corners
     done = commission(folder, *NAMES)
     assert done.code == 0, (done.out, done.err)
     return folder, done
@@ -37,15 +37,15 @@ def day(tmp_path_factory):
 def test_a_sound_arm_passes_every_step_in_one_run(day):
     folder, done = day
     record = read_commissioning(folder / FAKE_FOLDER)
-    assert [(each.step, each.cause) for each in record.steps] == [
+    assert [(entry.step, entry.cause) for entry in record.steps] == [
         (step, "") for step in STEPS
     ]
-    assert {each.operator for each in record.steps} == {"Ada"}
+    assert {entry.operator for entry in record.steps} == {"Ada"}
     assert lacks(record, {}, record.steps[-1].ended, "S0") == []
     assert "Every step is sound" in done.out
 
 
-def test_its_recordings_pass_again(day):
+def test_the_recordings_of_a_sound_arm_pass_a_recheck(day):
     folder, _ = day
     before = read_commissioning(folder / FAKE_FOLDER)
     config = folder / "rig.toml"
@@ -54,18 +54,18 @@ def test_its_recordings_pass_again(day):
     assert read_commissioning(folder / FAKE_FOLDER) == before
 
 
-def test_the_next_day_it_is_as_it_was_commissioned(day):
+def test_a_sound_arm_passes_the_daily_check(day):
     folder, _ = day
     done = commission(folder, *NAMES, "--daily")
     assert done.code == 0, (done.out, done.err)
     (check,) = read_history(folder / FAKE_FOLDER, is_simulated=True).checks
     assert (check.cause, check.operator) == ("", "Ada")
     assert (check.ended - check.started).total_seconds() < 150
-    names = {each.name for each in check.quantities}
+    names = {entry.name for entry in check.quantities}
     assert "lift-off of joint 4 over that of the commissioning" in names
 
 
-def test_a_torn_cable_is_seen_the_next_day_before_the_arm_is_activated(day):
+def test_a_torn_cable_fails_the_daily_check_before_the_arm_is_activated(day):
     folder, _ = day
     done = commission(folder, *NAMES, "--daily", "--wrong", "cable-4-torn")
     assert done.code == 3, (done.out, done.err)
@@ -74,7 +74,7 @@ def test_a_torn_cable_is_seen_the_next_day_before_the_arm_is_activated(day):
     assert check.cause.startswith("weight of the foot")
 
 
-def test_a_weak_motor_is_seen_the_next_day(day):
+def test_a_weak_motor_fails_the_daily_check(day):
     folder, _ = day
     done = commission(folder, *NAMES, "--daily", "--wrong", "motor-2-weak")
     assert done.code == 3, (done.out, done.err)
@@ -82,7 +82,7 @@ def test_a_weak_motor_is_seen_the_next_day(day):
     assert "joint 2" in check.cause
 
 
-def test_what_was_left_after_a_step_goes_on_with_the_next(day):
+def test_an_interrupted_commissioning_continues_with_the_next_step(day):
     kept = day[0] / FAKE_FOLDER
     record = read_commissioning(kept)
     middle = StepId.HUNG_WEIGHT
@@ -95,6 +95,6 @@ def test_what_was_left_after_a_step_goes_on_with_the_next(day):
     assert done.code == 0, (done.out, done.err)
     again = read_commissioning(kept)
     assert again.steps[: len(first)] == first
-    gone_on = [done.step for done in again.steps[len(first) :]]
-    assert gone_on == [StepId.REST_POSE, StepId.RAMPS]
+    continued = [done.step for done in again.steps[len(first) :]]
+    assert continued == [StepId.REST_POSE, StepId.RAMPS]
     assert "Still to do: C10, C11, C12, C13, C14." in done.out

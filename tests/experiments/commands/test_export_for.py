@@ -1,4 +1,4 @@
-"""`traction export --for`: what is written, and which mixed uses are refused."""
+"""`traction export --for` writes a folder per target and refuses mixed uses."""
 
 import json
 
@@ -53,7 +53,7 @@ def test_terrain_model_and_precision_are_chosen(db, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "words"),
     [
         (("--for", "c,unity"), "no target unity"),
         (("--for", "c", "--terrain", "S9"), "no terrain 'S9'"),
@@ -68,15 +68,15 @@ def test_terrain_model_and_precision_are_chosen(db, tmp_path):
         (("--float", "--terrain", "S0"), "--terrain, --float"),
     ],
 )
-def test_mixed_and_unknown_uses_are_refused(db, tmp_path, options, said):
+def test_mixed_and_unknown_uses_are_refused(db, tmp_path, options, words):
     done = export(db, tmp_path / "made", *options)
     assert done.code == 2
-    assert said in done.err
+    assert words in done.err
     assert "Nothing was written" in done.err or "Terrains: S0, TF" in done.err
     assert not (tmp_path / "made").exists()
 
 
-def test_what_the_targets_need_is_asked_for(db, tmp_path):
+def test_missing_options_and_an_unreadable_database_are_named(db, tmp_path):
     done = traction("export", "--for", "c", "--to", tmp_path / "made")
     assert (done.code, "needs the database" in done.err) == (2, True)
     done = traction("export", "--for", "c", "--terrain-db", db)
@@ -85,7 +85,7 @@ def test_what_the_targets_need_is_asked_for(db, tmp_path):
     assert (done.code, "cannot be read" in done.err) == (2, True)
 
 
-def test_a_folder_that_holds_something_is_left_alone(db, tmp_path):
+def test_a_folder_that_is_not_empty_is_left_alone(db, tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
     done = export(db, tmp_path, "--for", "c")
     assert done.code == 2

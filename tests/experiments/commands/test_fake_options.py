@@ -1,4 +1,4 @@
-"""Which arm `traction fake` serves."""
+"""Options choose the arm that `traction fake` serves."""
 
 import pytest
 
@@ -17,7 +17,7 @@ sole = [0.0, 0.0, 0.09]
 
 @pytest.fixture
 def serve(monkeypatch, tmp_path):
-    """Return a function that serves an arm, ends at once and returns what it is."""
+    """A function that serves an arm, ends at once and returns its pose."""
     seen = []
     build = home_arm.build_home_server
 
@@ -50,13 +50,13 @@ def test_a_bare_arm_has_neither_hand_nor_tool(serve):
 
 
 @pytest.mark.parametrize(("hand", "has_hand"), [("carry", True), ("none", False)])
-def test_the_hand_is_chosen_by_itself(serve, hand, has_hand):
+def test_the_hand_is_chosen_independently_of_the_tool(serve, hand, has_hand):
     pose = serve("--hand", hand)
     assert pose.has_hand is has_hand
     assert pose.tool is not None
 
 
-def test_what_is_named_counts_more_than_bare(serve):
+def test_named_options_override_bare(serve):
     assert serve("--bare", "--tool", "tread").tool.foot.mass == 0.45
     assert serve("--bare", "--hand", "carry").has_hand
 
@@ -72,12 +72,12 @@ def test_a_foot_comes_from_a_file_of_its_own(serve, tmp_path):
 @pytest.mark.parametrize(
     ("text", "firmware"), [("60", (60, 60)), ("200,40", (200, 40)), ("0", (0, 0))]
 )
-def test_firmware_is_of_pucks_and_safety_module(serve, text, firmware):
+def test_firmware_is_set_for_pucks_and_safety_module(serve, text, firmware):
     assert serve("--firmware", text).firmware == firmware
 
 
 @pytest.mark.parametrize("text", ["", "60,", "60,61,62", "-1", "6e1", "40000", "²"])
-def test_firmware_that_makes_no_sense_is_refused(text, tmp_path):
+def test_an_invalid_firmware_version_is_refused(text, tmp_path):
     where = ("--can", f"traction-fake:{tmp_path}/bus")
     done = traction("fake", *where, f"--firmware={text}")
     assert done.code == 2
@@ -88,7 +88,7 @@ def test_firmware_that_makes_no_sense_is_refused(text, tmp_path):
     ("content", "word"),
     [("mass = 0.3", "missing"), ("mass = -1\n" + FOOT[11:], "mass")],
 )
-def test_a_foot_that_makes_no_sense_starts_nothing(tmp_path, content, word):
+def test_an_invalid_foot_file_starts_nothing(tmp_path, content, word):
     path = tmp_path / "foot.toml"
     path.write_text(content)
     where = ("--can", f"traction-fake:{tmp_path}/bus", "--tool", path)
@@ -99,7 +99,7 @@ def test_a_foot_that_makes_no_sense_starts_nothing(tmp_path, content, word):
     assert not (tmp_path / "bus").exists()
 
 
-def test_a_foot_that_is_nowhere_is_named(tmp_path):
+def test_a_missing_foot_file_is_named(tmp_path):
     done = traction("fake", "--can", f"traction-fake:{tmp_path}/b", "--tool", "plough")
     assert done.code == 2
     assert "plough cannot be read" in done.err
@@ -114,39 +114,39 @@ def test_a_serial_sensor_needs_a_tool(tmp_path, arm):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_sensor_that_there_is_not_is_refused_with_the_kinds(tmp_path):
+def test_an_unknown_sensor_is_refused_with_the_known_kinds(tmp_path):
     done = traction("fake", "--serial", tmp_path / "line", "--sensor", "bosch")
     assert done.code == 2
     assert "bota, robotous, optoforce" in done.err
 
 
-def test_without_options_nothing_is_drawn_or_wrong(serve):
+def test_without_options_the_arm_is_nominal(serve):
     pose = serve()
     assert (pose.is_at_rest, pose.friction, pose.seed) == (False, None, None)
     assert pose.departure is None
 
 
-def test_an_arm_can_be_at_rest_mounted_otherwise_and_rub(serve):
+def test_pose_mount_and_friction_can_be_chosen(serve):
     pose = serve("--pose", "rest", "--mount", "90", "0", "-5", "--friction", "0.7")
     assert (pose.is_at_rest, pose.friction) == (True, 0.7)
     assert pose.departure.mount == pytest.approx([1.5708, 0.0, -0.0873], abs=1e-4)
     assert (pose.departure.zeros == 0.0).all()
 
 
-def test_a_seed_draws_one_of_many_sound_arms(serve):
+def test_a_seed_draws_a_reproducible_arm(serve):
     one, two, again = (serve("--seed", n).departure for n in ("1", "2", "1"))
     assert (one.zeros == again.zeros).all()
     assert (one.zeros != two.zeros).all()
 
 
-def test_a_wrong_arm_is_one_of_many_with_something_wrong(serve):
+def test_a_wrong_arm_is_drawn_with_its_error(serve):
     departure = serve("--wrong", "motor-3-reversed").departure
     assert departure.torque[2, 2] == -1.0
     assert departure.zeros.any()
 
 
 @pytest.mark.parametrize("command", ["fake", "run", "check", "calibrate", "rehearse"])
-def test_a_wrong_rig_that_there_is_not_is_refused_with_all_names(command):
+def test_an_unknown_wrong_rig_is_refused_with_all_names(command):
     more = {"run": ["S0"], "calibrate": ["sensor"]}.get(command, [])
     done = traction(command, *more, "--wrong", "motor-9-reversed")
     assert done.code == 2
@@ -170,13 +170,13 @@ def test_a_real_rig_cannot_be_made_wrong(command, option):
     assert "work only with --fake" in done.err
 
 
-def test_a_mount_is_three_angles():
+def test_a_mount_angle_out_of_range_is_refused():
     done = traction("check", "--fake", "--mount", "0", "400", "0")
     assert done.code == 2
     assert "degrees -180..180" in done.err
 
 
-def test_a_script_that_orders_nonsense_starts_nothing(tmp_path):
+def test_an_invalid_script_line_starts_nothing(tmp_path):
     script = tmp_path / "script"
     script.write_text("idle\n2 hang much\n")
     where = ("--can", f"traction-fake:{tmp_path}/bus", "--script", script)
@@ -186,5 +186,5 @@ def test_a_script_that_orders_nonsense_starts_nothing(tmp_path):
     assert not (tmp_path / "bus").exists()
 
 
-def test_every_calibration_of_the_command_line_is_there():
+def test_every_calibration_kind_of_the_command_line_is_implemented():
     assert set(CALIBRATIONS) == set(KINDS)

@@ -62,11 +62,11 @@ AUTO = ("--operator-script", "auto")
 IDLE, E_STOP = SafetyMode.IDLE, SafetyMode.E_STOP
 
 
-# --- a person in a hurry ------------------------------------------------------------
+# --- keys of a short session --------------------------------------------------------
 
 
 def hurry(asked):
-    """Press the keys that make a session short; leave after one fault."""
+    """Key that keeps a session short and ends it after one fault."""
     if asked.prompt is Prompt.READY:
         return " " if asked.since > 0.05 else ""
     if asked.prompt is Prompt.RECORDING:
@@ -79,7 +79,7 @@ def hurry(asked):
 
 
 def once(prompt, act, since=0.1):
-    """Return a `press` that lets `act(scene)` happen once, at `prompt`."""
+    """A `press` that calls `act(scene)` once, at `prompt`."""
     done = []
 
     def press(asked, scene):
@@ -100,13 +100,13 @@ def give_up(prompt):
 
 @dataclass
 class SimulatedScene:
-    """A copy of the session on the disk, and who works on it.
+    """A copy of the session on the disk, and the rig that works on it.
 
     Attributes:
         data: the data folder.
         config: the rig.toml that it was recorded with.
-        patch: changes the program for the time of a case.
-        built: what was built for it.
+        patch: changes the program during a case.
+        built: parts of the program that the case has built.
     """
 
     data: Path
@@ -123,14 +123,14 @@ class SimulatedScene:
         return only_session(self.data)
 
     def watch(self, press=None):
-        """Keep hold of what is built; `press(asked, scene)` goes before `hurry`."""
+        """Record what is built; `press(asked, scene)` goes before `hurry`."""
         self.built = watch_builds(self.patch)
         usual = AutoOperator.answer
 
         def answer(keys, asked):
-            found = press(asked, self) if press is not None else None
-            found = hurry(asked) if found is None else found
-            return usual(keys, asked) if found is None else found
+            key = press(asked, self) if press is not None else None
+            key = hurry(asked) if key is None else key
+            return usual(keys, asked) if key is None else key
 
         self.patch.setattr(AutoOperator, "answer", answer)
 
@@ -142,13 +142,13 @@ def resume(scene, *more, press=None) -> Done:
 
 @dataclass(frozen=True)
 class Case:
-    """How a message is raised, and what comes of it.
+    """How a message is raised, and its consequences.
 
     Attributes:
-        act: what is done in the scene.
+        act: raises the message in the scene.
         code: exit code of the command.
-        mode: of the arm at the end as its own devices know it; None = no arm.
-        words: what the message says beside the words of the catalogue.
+        mode: mode of the simulated arm at the end; None without an arm.
+        words: part of the message that is not in the catalogue.
     """
 
     act: Callable[[SimulatedScene], Done]
@@ -158,7 +158,7 @@ class Case:
 
 
 def tared(act=None, text="", words="") -> Case:
-    """Return the case of a tare that is told, tried again, and the last thing done."""
+    """Case of a failed tare that is reported and repeated before the session ends."""
     more = ("--fault", text) if text else ()
     lift = once(Prompt.LIFT, act) if act else lambda *_: None
 
@@ -169,7 +169,7 @@ def tared(act=None, text="", words="") -> Case:
 
 
 def fault(text, code=5, mode=IDLE, words="") -> Case:
-    """Return the case of a fault raised on the command line."""
+    """Case of a fault raised on the command line."""
     act = functools.partial(_resume_with, text=text)
     return Case(act, code, mode, words)
 
@@ -179,14 +179,14 @@ def _resume_with(scene, text) -> Done:
 
 
 def acted(prompt, act, code=5, words="", since=0.1) -> Case:
-    """Return the case of something that happens to the rig at `prompt`."""
+    """Case of an event that happens to the rig at `prompt`."""
     return Case(
         lambda scene: resume(scene, press=once(prompt, act, since)), code, words=words
     )
 
 
 def struck(name, mode=IDLE, words="") -> Case:
-    """Return the case of a fault of the devices during the tare, which ends it all."""
+    """Case of a device fault during the tare that ends the session."""
 
     def inject(scene):
         scene.rig.faults()[name]()
@@ -196,8 +196,8 @@ def struck(name, mode=IDLE, words="") -> Case:
     )
 
 
-def found_at_once(name, mode=IDLE, words="") -> Case:
-    """Return the case of a fault between the preflight and the pendant."""
+def struck_early(name, mode=IDLE, words="") -> Case:
+    """Case of a device fault between the preflight and the pendant."""
 
     def act(scene):
         usual = preflight.check_wrenches
@@ -213,7 +213,7 @@ def found_at_once(name, mode=IDLE, words="") -> Case:
 
 
 def refused(act, code=2, words="") -> Case:
-    """Return the case of a command that never reaches an arm."""
+    """Case of a command that never reaches an arm."""
     return Case(act, code, None, words)
 
 
@@ -241,7 +241,7 @@ def _not_a_number(scene):
 
 
 def _deaf(scene):
-    """Let the console show no sign of life for 0.6 s."""
+    """Stop the console's heartbeat for 0.6 s."""
     loop_client, left = scene.built.backend.loop_client, [30]
     usual = loop_client.beat
 
@@ -264,7 +264,7 @@ def _ask_an_idle_arm(scene):
 
 
 def _stand_still_for_long(scene):
-    """Let the next cycle be the first one for 0.2 s."""
+    """Make the next cycle the first one for 0.2 s."""
     usual, gaps = Cycle.__call__, [100]
 
     def call(cycle, tick):
@@ -289,7 +289,7 @@ def _lose_recorder(scene):
 
 
 def _swing(scene):
-    """Let a hand swing the arm, and its energy be allowed."""
+    """Swing the arm by hand, with its energy allowed."""
     cycle = scene.built.cycle
     motion = replace(cycle.limits.motion, float_energy=9.0)
     cycle.limits = replace(cycle.limits, motion=motion)
@@ -301,7 +301,7 @@ def _swing_hard(scene):
 
 
 def _allow_no(travel):
-    """Return what lets any way of the sole be too far."""
+    """A function that makes any travel of the sole exceed the limit `travel`."""
 
     def allow(scene):
         cycle = scene.built.cycle
@@ -311,20 +311,20 @@ def _allow_no(travel):
     return allow
 
 
-def _prove(scene):
-    """Give an arm that a hand carries no torque, as if it lay on its stops."""
+def _test_at_rest(scene):
+    """Take the torque from an arm that a hand carries, as if it lay on its stops."""
     scene.built.cycle.request(ArmState.HOLD)
     scene.built.cycle.prove(PoweredTestGoal(PoweredTestKind.REST))
 
 
 def _damp_in_vain(scene):
-    """Let joint 6 be too fast, and damping not stop it at once."""
+    """Make joint 6 too fast, and damping too slow to stop it."""
     _allow_no("damp_travel")(scene)
     scene.rig.faults()["overspeed"]()
 
 
 def _press_early(scene):
-    """Resume; somebody presses Shift-activate before it is asked for."""
+    """Resume; Shift-activate is pressed before it is asked for."""
     usual = runner.activate
 
     def activate(console_loop):
@@ -337,7 +337,7 @@ def _press_early(scene):
 
 
 def _meet(scene):
-    """Let the arm seem to move by itself, and its foot to meet something."""
+    """Make the arm appear to move by itself, and its foot to meet something."""
     scene.patch.setattr(FootController, "is_moving", lambda _: True)
     cycle = scene.built.cycle
     cycle.limits = replace(cycle.limits, contact_force_move=0.01)
@@ -348,26 +348,26 @@ def _pull_in_vain(scene):
 
 
 def _stand_still(scene):
-    """Let any way of the sole be too far for motor 1, which leads no foot."""
+    """Make any travel of motor 1 too far for an arm that stands still."""
     cycle = scene.built.cycle
     cycle.limits = replace(cycle.limits, still_travel=(1e-4, *[1.0] * 6))
 
 
 def _narrow(scene):
-    """Let joint 6, which stands at 1.2 rad, be allowed 1 rad only."""
+    """Limit joint 6, which is at 1.2 rad, to 1 rad."""
     cycle = scene.built.cycle
     upper = (*cycle.limits.q_upper[:5], 1.0, cycle.limits.q_upper[6])
     cycle.limits = replace(cycle.limits, q_upper=upper)
 
 
 def _tender(scene):
-    """Let the weight of a push be too much moment."""
+    """Make the weight of a push exceed the limit of the moment."""
     cycle = scene.built.cycle
     cycle.limits = replace(cycle.limits, contact_moment=0.001)
 
 
 def _lean(scene):
-    """Press more than a push does on a foot that stands, as this one is not yet."""
+    """Press harder than a push on a foot that counts as standing at once."""
     scene.patch.setattr(contact, "STANDING", 1.0)
     scene.rig.plant.finger = (0.0, 0.0, 60.0)
 
@@ -377,10 +377,10 @@ def _saturate(scene):
 
 
 def _plug_in_another(scene):
-    """Take the sensor away, as the process that reads it on a rig reports it."""
+    """Unplug the sensor and report another one, as the sensor process of a rig does."""
     scene.rig.faults()["ft-unplugged"]()
-    told = {"trouble": "Another F/T sensor was plugged in: 7, not 3."}
-    scene.patch.setattr(InProcessBackend, "sensor_metadata", lambda _: told)
+    fields = {"trouble": "Another F/T sensor was plugged in: 7, not 3."}
+    scene.patch.setattr(InProcessBackend, "sensor_metadata", lambda _: fields)
 
 
 def _no_exchange(scene):
@@ -389,7 +389,7 @@ def _no_exchange(scene):
 
 
 def _late_replies(scene):
-    """Let replies be late from the sensor's check on, before the exchange is timed."""
+    """Delay replies from the check of the sensor on, before the exchange is timed."""
     usual = preflight.reach_words
 
     def words(*arguments):
@@ -401,7 +401,7 @@ def _late_replies(scene):
 
 
 def _changed_puck(scene):
-    """Ask for one property in turn, so that a short session comes to it."""
+    """Watch one property only, so that a short session polls it."""
 
     def change(scene):
         scene.rig.faults()["puck-changed"]()
@@ -434,7 +434,7 @@ def _run(scene, terrain="TF", *more):
 
 
 def _kill(scene):
-    """Resume in a copy of this process, which kills itself in the second trial."""
+    """Resume in a fork that kills itself in the second trial."""
     child = os.fork()
     if child == 0:
         try:
@@ -455,7 +455,7 @@ def _crashed_resume(scene):
 
 
 def _complete(scene):
-    """Let the last trial count and the program end before it can say so."""
+    """Make the kept trial the last one, and cut the end of the session's journal."""
     path = scene.folder / "events.jsonl"
     first, *rest, _ = path.read_bytes().splitlines(keepends=True)
     start = journal_line({**(parse_line(first) or {}), "trials": 1}, 1)
@@ -490,7 +490,7 @@ def _mixed(scene):
 
 
 def _other_foot(scene):
-    """Say no to the question about the foot, after a session with the other one."""
+    """Answer no to the question about the foot, after a session with the other one."""
     newer = scene.folder.with_name("2027-01-01_S002_Tf.fake")
     newer.mkdir()
     (newer / "conditions.json").write_text('{"terrain.foot": "bare"}')
@@ -502,7 +502,7 @@ def _other_foot(scene):
 
 
 def _turned_sensor(scene):
-    """Begin a session with a calibration from before the sensor was turned round."""
+    """Begin a session with a calibration made before the sensor was turned round."""
     folder = scene.data.parent / "turned"
     folder.mkdir()
     change = ("sign = 1 ", 'calibration = "ft_sensor.toml"\nsign = 1 ')
@@ -527,7 +527,7 @@ def _no_end_tare(scene):
 
 
 CASES = {
-    # what a preflight finds
+    # found by a preflight
     "can-down": fault("can-down", 3, words="broke: Network is down"),
     "puck-missing": fault("puck-missing", 3, words="Puck 5 does not answer (1,2,3,4,6"),
     "not-zeroed": fault("not-zeroed", 3),
@@ -538,9 +538,9 @@ CASES = {
     "loop-dead": Case(_no_loop, 3),
     "ft-lost": Case(_lost_sensor, 3, words="while it was tested: The port is gone."),
     "not-active": Case(_never_active, 3),
-    "no-power": found_at_once("estop", E_STOP),
-    "not-ready": found_at_once("puck-silent", words="Puck 3 has not answered for "),
-    # what ends a trial and not the session: the second attempt is not begun here
+    "no-power": struck_early("estop", E_STOP),
+    "not-ready": struck_early("puck-silent", words="Puck 3 has not answered for "),
+    # faults that end a trial, not the session: no second attempt is begun here
     "ft-stale": fault("ft-stale@T2+0.1s", words="T02 stopped at 0.1 s"),
     "ft-saturated": fault("ft-saturated@T2+0.1s", words="range for 102 ms"),
     "contact-force": fault("contact-force@T2+0.1s", words="N on the foot (limit 100)"),
@@ -556,7 +556,7 @@ CASES = {
     "kinetic-energy": acted(Prompt.RECORDING, _swing_hard, 4, "kinetic energy was"),
     "damp-motion": acted(Prompt.RECORDING, _damp_in_vain, 4, "the sole's travel was"),
     "hold-motion": acted(Prompt.LIFT, _allow_no("hold_travel"), 4, "(limit 0.00)"),
-    "proof-motion": acted(Prompt.RECORDING, _prove, 4, "kinetic energy was"),
+    "proof-motion": acted(Prompt.RECORDING, _test_at_rest, 4, "kinetic energy was"),
     "activation-motion": acted(
         Prompt.SUPPORT, _allow_no("activation_travel"), 4, "(limit 0.00)", since=-1.0
     ),
@@ -566,7 +566,7 @@ CASES = {
     "console-silent": acted(Prompt.READY, _deaf, since=0.0),
     "recorder-silent": acted(Prompt.RECORDING, _stuck_recorder),
     "move-refused": acted(Prompt.RECORDING, _move),
-    # what is wrong with a tare
+    # problems of a tare
     "tare-moved": tared(text="tare-moved@T2+0.25s", words="Force varied "),
     "residual": tared(text="residual@T2+0s", words="feet.tread.mass 0.450 kg"),
     "tare-without-sensor": replace(
@@ -575,7 +575,7 @@ CASES = {
     "tare-poor": tared(_saturate, words="were flagged during tare"),
     "mounting": Case(_turned_sensor, 3, words="degrees about z"),
     "no-end-tare": Case(_no_end_tare, 0, words="left out as asked."),
-    # what takes the arm away; in a trial: test_bus_faults
+    # faults that end the session; in a trial: test_bus_faults
     "can-silence": struck("can-silence"),
     "safety-silent": struck("safety-silent"),
     "replies-late": struck("replies-late", words="Pucks 1,2,3,4,5,6,7 have answered"),
@@ -608,7 +608,7 @@ CASES = {
     "complete": refused(_complete, 0),
     "bug": fault("bug@T2+0.1s", 1, words="InjectedBugError: rehearsed."),
     "command-bug": refused(lambda s: _failing_status(s, ZeroDivisionError("so")), 1),
-    # what was asked for cannot be
+    # impossible requests
     "config": refused(_bad_config, words='cells[0].trials = "ten" - expected a w'),
     "mismatch": refused(lambda s: _run(s, "S0"), words="S001 is TF, you asked for S0"),
     "unfinished": refused(_run, words="S001 TF is unfinished, 1 of 2 kept."),
@@ -622,7 +622,7 @@ CASES = {
 
 @pytest.fixture(scope="module")
 def base(tmp_path_factory, config):
-    """Return the data of a session that was left after one kept trial of two."""
+    """The data of a session that was left after one kept trial of two."""
 
     def press(asked, rig):
         second = asked.prompt is Prompt.LIFT and asked.trial == 2
@@ -638,7 +638,7 @@ def base(tmp_path_factory, config):
 
 @pytest.fixture
 def scene(base, config, tmp_path, monkeypatch):
-    """Return a copy of the base; its tares are short, which others prove."""
+    """A copy of the base with short tares; other tests check full ones."""
     shutil.copytree(base, tmp_path / "data")
     monkeypatch.setattr(taring, "TARE_SECONDS", 0.5)
     monkeypatch.setattr(tare, "MIN_DURATION", 0.4)
@@ -662,15 +662,15 @@ def test_every_row_of_the_catalogue_has_a_case():
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_a_message_is_told_with_its_code_and_nothing_earlier_is_touched(scene, name):
+def test_a_message_has_its_exit_code_and_earlier_trials_stay_unchanged(scene, name):
     case, before = CASES[name], files_of_first(scene)
     done = case.act(scene)
-    told = [
+    matches = [
         line
         for line in f"{done.err}\n{done.out}".splitlines()
         if re.search(pattern(name), line) and case.words in line
     ]
-    assert told, done.err + done.out
+    assert matches, done.err + done.out
     assert done.code == case.code
     assert len(before) == 3  # the trial, its sidecar, the truth
     assert files_of_first(scene) == before
@@ -682,7 +682,7 @@ def test_a_message_is_told_with_its_code_and_nothing_earlier_is_touched(scene, n
 
 
 @pytest.mark.parametrize("name", sorted(COMPUTER_FAULTS))
-def test_faults_of_the_computer_can_be_raised_in_every_trial(name):
+def test_a_planned_fault_of_the_computer_names_its_trial_and_time(name):
     plan = FaultPlan(name, 3, 1.5)
     assert plan.to_text() == f"{name}@T3+1.5s"
 

@@ -1,4 +1,4 @@
-"""traction import as a person meets it: from a bag to a report."""
+"""`traction import` from a bag to a report."""
 
 import json
 import shlex
@@ -14,7 +14,7 @@ LOG = Rubbing(strokes=2)
 
 @pytest.fixture(scope="module")
 def given(tmp_path_factory):
-    """Return a log and its URDF."""
+    """A log and its URDF."""
     folder = tmp_path_factory.mktemp("robot")
     return write_bag2(folder / "log", LOG), write_urdf(folder)
 
@@ -67,13 +67,13 @@ def test_a_list_prints_the_command_line_that_imports(given, tmp_path):
     assert "▲" not in done.out
 
 
-def test_a_value_that_is_shown_is_never_applied(given, tmp_path):
+def test_a_measured_lag_is_shown_and_never_replaces_the_stated_one(given, tmp_path):
     done = imported(given, tmp_path / "a", "--lag", "60")
     assert done.code == 0, done.err
     assert "▲ lag: 60 ms stated; 10 ms shown" in done.out
     assert "starts and stops show" in done.out
     record = json.loads((tmp_path / "a" / "import.json").read_text())
-    (lag,) = (each for each in record["checks"] if each["name"] == "lag")
+    (lag,) = (check for check in record["checks"] if check["name"] == "lag")
     assert lag["value"] == [60.0]
     assert lag["shown"] == pytest.approx([10.0], abs=5.0)
 
@@ -106,7 +106,7 @@ def test_from_a_bag_to_a_report(given, tmp_path):
 
 
 @pytest.mark.slow
-def test_an_estimated_wrench_is_marked_to_the_last_page(given, tmp_path):
+def test_an_estimated_wrench_is_marked_in_the_report(given, tmp_path):
     done = imported(given, tmp_path / "a", "--estimated")
     assert "estimated by the robot, not measured" in done.out
     traction("fit", tmp_path / "a", "--to", tmp_path / "b", "--models", "tustin")
@@ -140,21 +140,23 @@ def test_a_changed_record_of_an_import_is_refused(given, tmp_path):
         (("--heading", "90"), "--heading"),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_paragraph(given, tmp_path, more, why):
+def test_an_invalid_option_is_refused_and_nothing_is_written(
+    given, tmp_path, more, why
+):
     done = imported(given, tmp_path / "out", *more)
     assert done.code == 2
     assert why in done.err
     assert not (tmp_path / "out").exists()
 
 
-def test_what_is_missing_is_asked_for(given, tmp_path):
+def test_missing_options_are_named(given, tmp_path):
     done = traction("import", given[0], "--to", tmp_path / "out")
     assert done.code == 2
     needed = "--urdf, --foot, --sensor, --acts, --tare, --tool-mass, --along, --normal"
     assert f"needs {needed}, --lag, --trials" in " ".join(done.err.split())
 
 
-def test_a_folder_that_holds_something_is_never_written_to(given, tmp_path):
+def test_a_folder_that_is_not_empty_is_never_written_to(given, tmp_path):
     (tmp_path / "mine").write_text("")
     done = imported(given, tmp_path)
     assert done.code == 2
@@ -162,7 +164,7 @@ def test_a_folder_that_holds_something_is_never_written_to(given, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_bag_of_ros_1_is_imported_alike(tmp_path):
+def test_a_bag_of_ros_1_is_imported_too(tmp_path):
     log = write_bag(tmp_path / "log.bag", LOG, "LZ4")
     done = imported((log, write_urdf(tmp_path)), tmp_path / "out")
     assert done.code == 0, done.err

@@ -12,7 +12,7 @@ _NAMES_LOADED = (
 
 
 def loaded_by(*arguments: str) -> set[str]:
-    """Return the modules that a command has loaded at its end."""
+    """Modules that a command has loaded at its end."""
     done = subprocess.run(
         [sys.executable, "-c", _NAMES_LOADED, *arguments],
         capture_output=True,
@@ -22,13 +22,15 @@ def loaded_by(*arguments: str) -> set[str]:
     return set(done.stdout.splitlines()[-1].split())
 
 
-def test_to_verify_loads_no_library_of_reports(tmp_path: Path):
+def test_verify_loads_no_library_of_reports(tmp_path: Path):
     loaded = loaded_by("verify", "--all", "--data", str(tmp_path))
     assert "experiments.commands.verify" in loaded
     assert not loaded & {"matplotlib", "pinocchio", "scipy", "jinja2", "analysis.study"}
 
 
-def test_a_report_prepares_workers_unless_its_results_are_kept(tmp_path, monkeypatch):
+def test_a_report_prepares_workers_unless_its_results_are_up_to_date(
+    tmp_path, monkeypatch
+):
     prepared = []
     monkeypatch.setattr("experiments.report.workers.warm_workers", prepared.append)
     trials = tmp_path / "sessions" / "2026-01-01_S001_S0.fake" / "trials"

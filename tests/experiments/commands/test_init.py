@@ -1,4 +1,4 @@
-"""traction init: the files to be edited."""
+"""`traction init` writes valid settings and overwrites nothing."""
 
 import pytest
 
@@ -6,7 +6,7 @@ from experiments.settings.load import load_settings
 from tests.experiments.program import traction
 
 
-def test_both_files_are_accepted_as_they_are_written(tmp_path):
+def test_both_files_are_valid_as_written(tmp_path):
     done = traction("init", tmp_path / "lab")
     assert done.code == 0, done.err
     settings = load_settings(tmp_path / "lab" / "rig.toml")
@@ -27,7 +27,7 @@ def test_nothing_is_overwritten(tmp_path, there):
     assert (tmp_path / there).read_text() == "mine"
 
 
-def test_the_crosses_of_the_comments_are_right(tmp_path):
+def test_the_crosses_in_the_comments_are_valid(tmp_path):
     assert traction("init", tmp_path).code == 0
     matrix = tmp_path / "matrix.toml"
     lines = matrix.read_text().splitlines()

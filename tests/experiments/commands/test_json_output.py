@@ -1,4 +1,4 @@
-"""What commands print for programs, held against docs/data.md."""
+"""The JSON output of commands has the keys that docs/data.md documents."""
 
 import json
 import re
@@ -19,14 +19,14 @@ PAGE = (Path(__file__).parents[3] / "docs" / "data.md").read_text()
 
 
 def documented(command):
-    """Return the keys that the page names for a command."""
+    """Keys that the page names for a command."""
     (row,) = [line for line in PAGE.splitlines() if line.startswith(f"| `{command}`")]
     return set(re.findall(r"`(\w+)`", row.rpartition("|")[0].rpartition("|")[2]))
 
 
 @pytest.fixture
 def partial(tmp_path):
-    """Return a recording that was never ended: 300 cycles."""
+    """A recording of 300 cycles that was never ended."""
     writer = write_trial(tmp_path / "T01.mcap", make_cycles(300), block=50)
     writer.close_partial()
     return writer.partial
@@ -43,7 +43,7 @@ def test_recover_prints_every_file_with_the_documented_keys(partial):
     assert again["state"] == "saved before"
 
 
-def test_recover_names_what_failed_and_ends_with_6(partial):
+def test_recover_names_the_file_that_failed(partial):
     empty = partial.with_name("T02.mcap.partial")
     empty.write_bytes(b"nothing")
     done = traction("recover", partial, empty, "--json")
@@ -81,7 +81,7 @@ def test_bench_has_the_documented_keys():
 
 
 @pytest.mark.slow
-def test_report_prints_what_it_has_made_and_nothing_else(recorded):
+def test_report_prints_its_results_as_json_and_nothing_else(recorded):
     done = traction("report", "S001", "--json", "--data", recorded.data)
     content = json.loads(done.out)
     assert (done.code, done.err) == (0, "")
@@ -93,7 +93,7 @@ def test_report_prints_what_it_has_made_and_nothing_else(recorded):
     assert content["terrains"]["TF"]["trials"] == 2
 
 
-def test_a_report_that_is_refused_prints_nothing_for_the_program(tmp_path):
+def test_a_refused_report_prints_no_json(tmp_path):
     done = traction("report", "S009", "--json", "--data", tmp_path)
     assert (done.code, done.out) == (2, "")
     assert "S009" in done.err

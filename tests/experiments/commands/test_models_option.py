@@ -1,4 +1,4 @@
-"""`--models`: which models a report fits and shows."""
+"""`--models` selects the models that a report fits and shows."""
 
 import json
 from pathlib import Path
@@ -11,7 +11,7 @@ SLICE = Path(__file__).parents[2] / "data" / "rehearsal_slice.npz"
 
 
 @pytest.mark.slow
-def test_only_the_models_that_are_named_are_fitted_and_shown(tmp_path):
+def test_only_the_named_models_are_fitted_and_shown(tmp_path):
     done = traction("fit", SLICE, "--to", tmp_path / "fit", "--models", "tustin,gp_nn")
     assert done.code == 0, done.err
     fits = json.loads((tmp_path / "fit" / "fits.json").read_text())
@@ -23,7 +23,7 @@ def test_only_the_models_that_are_named_are_fitted_and_shown(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["", "best", "tustin,tustin", "gp_se best"])
-def test_models_that_there_are_not_are_refused_with_the_list(tmp_path, text):
+def test_unknown_models_are_refused_with_the_list(tmp_path, text):
     done = traction("fit", SLICE, "--to", tmp_path / "fit", "--models", text)
     assert done.code == 2
     assert "--models" in done.err

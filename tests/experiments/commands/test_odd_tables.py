@@ -1,4 +1,4 @@
-"""Tables from elsewhere that cannot be analysed as they should: what is said then."""
+"""The report names what it cannot do with deficient tables, and does the rest."""
 
 import json
 import re
@@ -15,7 +15,7 @@ ROWS = 700
 
 
 def made(k, *, v=None, F_n=None):
-    """Return t, v_t, F_n, F_t of a trial under a known law, shape (n, 4)."""
+    """t, v_t, F_n, F_t of a trial under a known law, shape (n, 4)."""
     rng = np.random.default_rng(k)
     v = 0.08 + 0.07 * np.sin(np.arange(ROWS) * 0.009) if v is None else v
     t = 0.002 * np.arange(v.size)
@@ -30,8 +30,8 @@ def holed(k):
     return table
 
 
-def odd_trials():
-    """Return every kind of odd trial under a terrain's name of its own."""
+def deficient_trials():
+    """Trials with every kind of deficiency, each kind under its own terrain."""
     return {
         "single/00": made(0),
         "pair/00": made(1),
@@ -50,10 +50,10 @@ def odd_trials():
 
 
 def fitted(folder):
-    """Return (what was printed, the page's text, fits.json) of all odd tables."""
-    np.savez(folder / "odd.npz", **odd_trials())
+    """(printed text, text of the page, fits.json) of all deficient tables."""
+    np.savez(folder / "deficient.npz", **deficient_trials())
     stones = ("--stones", "load=none,holes=small,twice=small")
-    done = traction("fit", folder / "odd.npz", "--to", folder / "out", *stones)
+    done = traction("fit", folder / "deficient.npz", "--to", folder / "out", *stones)
     assert done.code == 0, done.err
     page = (folder / "out/report/index.html").read_text()
     fits = json.loads((folder / "out/fits.json").read_text())
@@ -61,16 +61,16 @@ def fitted(folder):
 
 
 @pytest.fixture(scope="module")
-def odd(tmp_path_factory):
+def deficient(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
-        # what is said is tested here; pictures cost seconds, see the long test
+        # only texts are tested here; the long test draws the pictures
         patch.setattr(
             "analysis.report.style.render",
             lambda key, *_, **__: Picture(key, b"png", b"pdf"),
         )
         patch.setattr("analysis.study.tasks.available_cores", lambda: 1)
         patch.setattr("analysis.report.drawing.available_cores", lambda: 1)
-        yield fitted(tmp_path_factory.mktemp("odd"))
+        yield fitted(tmp_path_factory.mktemp("deficient"))
 
 
 @pytest.mark.parametrize(
@@ -87,41 +87,41 @@ def odd(tmp_path_factory):
         "health and limits are unknown",
     ],
 )
-def test_the_report_says_what_it_cannot_do(odd, sentence):
-    _, text, _ = odd
+def test_the_report_names_what_it_cannot_do(deficient, sentence):
+    _, text, _ = deficient
     assert sentence in text
 
 
 @pytest.mark.parametrize("terrain", ["pair", "load", "holes", "twice"])
-def test_the_rest_is_done_all_the_same(odd, terrain):
-    _, _, fits = odd
+def test_terrains_with_enough_data_are_fitted_nevertheless(deficient, terrain):
+    _, _, fits = deficient
     # F_t spans 5 N; one short trial each is enough to see the law
     for model in ("tustin", "gp_se"):
         assert fits["terrains"][terrain]["mae"][model] < 1.0
 
 
-def test_stones_that_were_given_group_the_terrains(odd):
-    _, _, fits = odd
+def test_given_stones_group_the_terrains(deficient):
+    _, _, fits = deficient
     levels = fits["findings"]["identification"]["by_density"]["50"]
     assert set(levels["stones"]["names"]) == {"pair", "flat", "small"}
     assert set(levels["surface"]["names"]) == {"pair", "flat", "rocky"}
 
 
 @pytest.mark.parametrize("terrain", ["single", "stuck", "short"])
-def test_what_cannot_be_fitted_has_no_number(odd, terrain):
-    _, text, fits = odd
+def test_a_terrain_that_cannot_be_fitted_has_no_error_value(deficient, terrain):
+    _, text, fits = deficient
     assert set(fits["terrains"][terrain]["mae"].values()) == {None}
     assert terrain in text
 
 
-def test_warnings_are_said_where_the_program_runs(odd):
-    out, _, _ = odd
+def test_warnings_are_printed_by_the_command_too(deficient):
+    out, _, _ = deficient
     assert "▲ twice: 1400 duplicate rows were dropped." in out
 
 
 @pytest.mark.long
 @pytest.mark.timeout(300)
-def test_every_figure_of_odd_tables_is_drawn(tmp_path):
+def test_figures_of_deficient_tables_are_drawn(tmp_path):
     fitted(tmp_path)
     drawn = {path.stem for path in (tmp_path / "out/figures").glob("*.pdf")}
     assert {"fig4_excerpts", "fig9_errors", "trials", "trends", "coverage"} <= drawn

@@ -51,7 +51,7 @@ inertia = [4e-4, 5.5e-4, 4.5e-4]
 sole = [0.01, 0.0, 0.112]
 """
 WET = "\n[simulate.moisture.wet]\ns_inf = 0.8\nk_w = 1.2\n"
-# a tenth of the 54 cells: every gravel, word, foot and incline among them
+# a tenth of the 54 cells, with every gravel, moisture, foot and incline
 RECORDED = ("G12dt+0", "G19wt+0", "G37dt+0", "G37wb+10", "G12db-10", "G19wr+10")
 
 
@@ -70,7 +70,7 @@ class Lab:
         return self.folder / "data"
 
     def run(self, *arguments):
-        """Run a command with the settings and data of the folder; it has to succeed."""
+        """Run a command with the settings and data of the folder; it must succeed."""
         done = traction(*arguments, "--config", self.config, "--data", self.data)
         assert (done.code, done.err) == (0, ""), done
         return done.out
@@ -78,7 +78,7 @@ class Lab:
 
 @pytest.fixture(scope="module")
 def lab(tmp_path_factory):
-    """Return a folder in which an own experiment was set up, taught and recorded."""
+    """A folder in which another experiment was set up, taught and recorded."""
     lab = Lab(tmp_path_factory.mktemp("own"))
     assert traction("init", lab.config.parent).code == 0
     rig, matrix = lab.config.read_text() + ROUND, MATRIX
@@ -102,8 +102,8 @@ def lab(tmp_path_factory):
 
 
 def test_every_session_is_counted_under_its_own_number(lab):
-    found = {session.id: session.terrain for session in list_sessions(lab.data)}
-    assert found == {f"S00{k}": cell for k, cell in enumerate(RECORDED, 1)}
+    terrains = {session.id: session.terrain for session in list_sessions(lab.data)}
+    assert terrains == {f"S00{k}": cell for k, cell in enumerate(RECORDED, 1)}
     counted = json.loads(lab.run("status", "--json"))
     assert "journal, but not the name" not in json.dumps(counted)
 
@@ -121,14 +121,14 @@ def test_every_cell_is_one_line_of_the_settings(lab):
     lines = lab.run("check", "--config-only").splitlines()
     cells = [line for line in lines if line.startswith("   cell ")]
     assert len(cells) == 54
-    (one,) = [line for line in cells if " G37wb+10:" in line]
+    (row,) = [line for line in cells if " G37wb+10:" in line]
     for part in ("foot bare", "d50 37", "moisture wet", "down10", "+10 degrees"):
-        assert part in one
+        assert part in row
 
 
 @pytest.fixture(scope="module")
 def reported(lab):
-    """Return the page of the report of everything that was recorded."""
+    """The page of the report of all recordings."""
     lab.run("report", "--all")
     return (lab.data / "study" / "report" / "index.html").read_text()
 
@@ -145,26 +145,26 @@ def test_the_report_has_cells_and_no_statement_of_the_paper(lab, reported):
 
 @pytest.fixture(scope="module")
 def database(lab):
-    """Return the terrain database of everything that was recorded."""
+    """The terrain database of all recordings."""
     path = lab.folder / "db.json"
     lab.run("export", "--all", "--terrain-db", path)
     return path
 
 
-def test_the_database_states_factors_and_feet_and_tells_a_trial(lab, database):
+def test_the_database_states_factors_and_feet_and_identifies_a_trial(lab, database):
     content = json.loads(database.read_text())
     assert content["version"] == "1.0"
-    known = content["terrains"]
-    assert set(known) == set(RECORDED)
+    terrains = content["terrains"]
+    assert set(terrains) == set(RECORDED)
     factors = {"d50": 37.0, "moisture": "wet", "foot": "bare"}
-    assert known["G37wb+10"]["factors"] == factors
+    assert terrains["G37wb+10"]["factors"] == factors
     (session,) = [s for s in list_sessions(lab.data) if s.terrain == "G19wt+0"]
     trial = session.path / "trials" / "T01.mcap"
     out = json.loads(lab.run("identify", trial, "--terrain-db", database, "--json"))
     assert "G19wt+0" in json.dumps(out)
 
 
-def test_a_publication_holds_it_all_and_its_results_come_out_again(lab, reported):
+def test_a_publication_reproduces_its_results_and_reveals_a_loss(lab, reported):
     crate = lab.folder / "crate"
     person = ("--author", "Family, Given", "--licence", "CC-BY-4.0")
     assert "18 trials published" in lab.run("publish", "--all", "--to", crate, *person)
@@ -176,7 +176,7 @@ def test_a_publication_holds_it_all_and_its_results_come_out_again(lab, reported
     assert "G12dt+0" in done.out + done.err
 
 
-def test_every_name_of_a_cell_is_that_of_a_session(tmp_path):
+def test_every_cell_name_is_read_back_from_its_session(tmp_path):
     for name in ("A", "9+", "G12dt+10", "a-b+c", "Z" * 24):
         made = create_session(tmp_path, name, is_simulated=True, utc_ns=10**18)
         assert made.terrain == name

@@ -22,7 +22,7 @@ CHUNK, ATTACHMENT = 6, 9
 
 @pytest.fixture(scope="module")
 def left(tmp_path_factory):
-    """Return the bytes of a `.partial` of 300 cycles in six chunks."""
+    """The bytes of a `.partial` of 300 cycles in six chunks."""
     path = tmp_path_factory.mktemp("left") / "T01.mcap"
     writer = write_trial(path, make_cycles(300), block=50)
     writer.close_partial()
@@ -31,7 +31,7 @@ def left(tmp_path_factory):
 
 @pytest.fixture
 def folder(tmp_path, left):
-    """Return a session folder with a torn, an empty and a whole file."""
+    """A session folder with a torn, an empty and a whole file."""
     trials = tmp_path / "S012" / "trials"
     trials.mkdir(parents=True)
     (trials / "T07.mcap.partial").write_bytes(left[:-3000])
@@ -41,7 +41,7 @@ def folder(tmp_path, left):
     return tmp_path / "S012"
 
 
-def test_it_says_what_was_saved_and_lost(folder):
+def test_recover_says_what_was_saved_and_lost(folder):
     done = traction("recover", folder / "trials" / "T07.mcap.partial")
     assert done.code == 0
     assert "saved 0.50 s, 250 cycles, 351 messages -> T07.recovered.mcap" in done.out
@@ -52,14 +52,14 @@ def test_it_says_what_was_saved_and_lost(folder):
     assert not reader.is_complete
 
 
-def test_a_folder_stands_for_its_partial_files(folder):
+def test_recover_of_a_folder_recovers_its_partial_files(folder):
     done = traction("recover", folder)
     assert (folder / "trials" / "T07.recovered.mcap").exists()
     assert "T06" not in done.out
     assert "2 files: 1 done, 1 not." in done.out
 
 
-def test_a_file_with_nothing_to_save_is_6_and_the_others_are_done(folder):
+def test_a_file_with_nothing_to_save_is_named_and_others_are_recovered(folder):
     done = traction("recover", *sorted((folder / "trials").glob("*.partial"))[::-1])
     assert done.code == 6
     assert "T08.mcap.partial: has nothing to save" in done.err
@@ -67,24 +67,24 @@ def test_a_file_with_nothing_to_save_is_6_and_the_others_are_done(folder):
     assert (folder / "trials" / "T07.recovered.mcap").exists()
 
 
-def test_a_pattern_in_quotes_is_understood(folder):
+def test_a_pattern_in_quotes_is_expanded(folder):
     done = traction("recover", folder / "trials" / "T07*.partial")
     assert done.code == 0
     assert (folder / "trials" / "T07.recovered.mcap").exists()
 
 
-def test_a_file_named_twice_is_done_once(folder):
+def test_a_file_named_twice_is_recovered_once(folder):
     path = folder / "trials" / "T07.mcap.partial"
     assert traction("recover", path, path).out.count("saved") == 1
 
 
-def test_a_whole_trial_says_so(folder):
+def test_a_complete_trial_needs_no_recovery(folder):
     done = traction("recover", folder / "trials" / "T06.mcap")
     assert done.code == 0
     assert "is complete, nothing to recover (0.20 s, 100 cycles" in done.out
 
 
-def test_recovering_again_says_that_it_was_done(folder):
+def test_a_second_recovery_says_that_the_file_was_recovered_before(folder):
     path = folder / "trials" / "T07.mcap.partial"
     traction("recover", path)
     done = traction("recover", path)
@@ -99,7 +99,7 @@ def test_a_recovered_trial_needs_no_recovery(folder):
     assert "is sound, though incomplete, nothing to recover" in done.out
 
 
-def test_a_name_that_means_nothing_is_a_usage_error_before_any_work(folder):
+def test_a_missing_file_is_a_usage_error_before_any_work(folder):
     done = traction("recover", folder, folder / "T99.mcap.partial")
     assert done.code == 2
     assert "There is no file" in done.err
@@ -112,7 +112,7 @@ def test_a_folder_without_partial_files_has_nothing_to_recover(tmp_path):
     assert "nothing to recover" in done.out
 
 
-def test_a_half_copied_trial_lacks_what_its_sidecar_states(tmp_path):
+def test_a_half_copied_trial_is_compared_with_its_sidecar(tmp_path):
     path = tmp_path / "T01.mcap"
     seal(write_trial(path, make_cycles(300), block=50), "travel")
     path.with_suffix(".json").write_text('{"trial": "T01", "cycles": 300}')
@@ -125,7 +125,7 @@ def test_a_half_copied_trial_lacks_what_its_sidecar_states(tmp_path):
 
 
 @pytest.mark.parametrize("stated", ['"300"', "1e400", "true", "-1", "9" * 50])
-def test_a_sidecar_that_states_nonsense_says_nothing_of_a_loss(folder, stated):
+def test_an_invalid_cycle_count_in_a_sidecar_reports_no_loss(folder, stated):
     sidecar = folder / "trials" / "T07.json"
     sidecar.write_text(f'{{"cycles": {stated}}}')
     done = traction("recover", folder / "trials" / "T07.mcap.partial")
@@ -133,7 +133,7 @@ def test_a_sidecar_that_states_nonsense_says_nothing_of_a_loss(folder, stated):
     assert "are missing" not in done.out
 
 
-def test_a_trial_of_a_program_without_checksums_is_copied_with_them(folder):
+def test_a_trial_without_a_data_checksum_is_copied_in_full(folder):
     source = folder / "trials" / "T06.mcap"
     data = bytearray(source.read_bytes())
     start = summary_start(data)
@@ -147,7 +147,7 @@ def test_a_trial_of_a_program_without_checksums_is_copied_with_them(folder):
     assert copied.data.tobytes() == TrialReader(source).cycles().data.tobytes()
 
 
-def test_what_is_lost_in_the_middle_is_said_where_it_was(folder):
+def test_a_loss_in_the_middle_is_reported_with_its_time(folder):
     path = folder / "trials" / "T09.mcap"
     seal(write_trial(path, make_cycles(300), block=50), "travel")
     data = bytearray(path.read_bytes())
@@ -164,7 +164,7 @@ def test_what_is_lost_in_the_middle_is_said_where_it_was(folder):
 
 
 def with_damaged_attachment(folder, name):
-    """Return a trial whose attachment `name` no other file holds, and is damaged."""
+    """A trial with a damaged attachment `name` that no other file holds."""
     path = folder / "trials" / "T09.mcap"
     header = make_header(attachments={name: b"# no other file has it"})
     seal(write_trial(path, make_cycles(300), header), "travel")
@@ -175,7 +175,7 @@ def with_damaged_attachment(folder, name):
     return path
 
 
-def test_an_attachment_that_is_gone_is_named(folder):
+def test_a_lost_attachment_is_named(folder):
     path = with_damaged_attachment(folder, "config.toml")
     done = traction("recover", path)
     assert "Lost: config.toml, which no file beside it holds." in done.out
@@ -202,7 +202,7 @@ def test_a_copy_that_cannot_be_analysed_is_not_called_saved(folder):
 
 
 def rewritten(source, target, *, has_checksums):
-    """Write the messages and metadata of a file anew, as another program does."""
+    """Rewrite the messages and metadata of a file, as another program does."""
     with source.open("rb") as file, target.open("wb") as out:
         reader = make_reader(file)
         writer = Writer(out, enable_data_crcs=has_checksums)
@@ -252,7 +252,9 @@ def test_a_file_rewritten_without_its_attachments_is_not_called_saved(
     assert again["attachments_missing"] == ["terrain.toml"]
 
 
-def test_an_attachment_that_the_analysis_can_do_without_is_told(folder, tmp_path):
+def test_a_missing_attachment_that_the_analysis_does_not_need_is_named(
+    folder, tmp_path
+):
     whole = tmp_path / "T10.mcap"
     header = make_header(attachments={"config.toml": b"# no other file has it"})
     writer = write_trial(whole, make_cycles(300), header)

@@ -22,8 +22,8 @@ from tests.experiments.program import traction, write_config
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 
 
-class InThisThread:
-    """An executor that does at once what it is given."""
+class ImmediateExecutor:
+    """Executor that runs its work at once."""
 
     def __enter__(self):
         return self
@@ -38,7 +38,7 @@ class InThisThread:
 
 
 def in_this_process(arguments, folder):
-    """Run a session here instead of in a process of its own, which starts slowly."""
+    """Run a session here instead of in its own process, which starts slowly."""
     done = traction(*arguments)
     folder.with_name(folder.name + ".log").write_text(done.out + done.err)
     return done.code
@@ -56,7 +56,7 @@ def two_terrains(folder):
 
 
 def digests(data):
-    """Return what was recorded, by terrain: times apart, bit for bit."""
+    """Checksums of the cycles of all kept trials, by terrain."""
     return {
         session.terrain: [
             hashlib.sha256(TrialReader(path).cycles().data.tobytes()).hexdigest()
@@ -68,12 +68,12 @@ def digests(data):
 
 @pytest.fixture(scope="module")
 def rehearsed(tmp_path_factory):
-    """Return (what was said, data folder) of a rehearsal of one trial each."""
+    """(result of the command, data folder) of a rehearsal of one trial each."""
     folder = tmp_path_factory.mktemp("rehearsed")
     config = two_terrains(folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(recording, "_record", in_this_process)
-        patch.setattr(recording, "_pool", lambda _: InThisThread())
+        patch.setattr(recording, "_pool", lambda _: ImmediateExecutor())
         done = traction(
             *("rehearse", "--trials", 1, "--seed", 3, "--jobs", 1),
             *("--config", config, "--data", folder),
@@ -81,7 +81,7 @@ def rehearsed(tmp_path_factory):
     return done, folder / "rehearsal_3"
 
 
-def test_a_study_outside_its_bands_ends_with_exit_code_6(rehearsed):
+def test_a_study_outside_its_bands_fails_and_names_them(rehearsed):
     done, _ = rehearsed
     assert done.code == 6  # seven centimetres have too few samples
     assert "Outside their bands: " in done.err
@@ -97,28 +97,28 @@ def test_every_band_is_printed_with_its_limits(rehearsed):
 
 def test_the_bands_are_written_for_programs(rehearsed):
     _, folder = rehearsed
-    found = json.loads((folder / "bands.json").read_text())
-    by_id = {band["id"]: band for band in found["bands"]}
-    assert found["plan"]["seed"] == 3
+    results = json.loads((folder / "bands.json").read_text())
+    by_id = {band["id"]: band for band in results["bands"]}
+    assert results["plan"]["seed"] == 3
     assert by_id["E11"]["is_met"] is False
     assert by_id["T1"]["is_met"] is True  # signs, frames and kinematics are right
     assert by_id["T5"]["values"] == [0]
 
 
 def test_with_few_trials_the_bands_of_models_are_left_out(rehearsed):
-    found = json.loads((rehearsed[1] / "bands.json").read_text())
-    assert not {band["id"][0] for band in found["bands"]} & {"A", "B", "C"}
+    results = json.loads((rehearsed[1] / "bands.json").read_text())
+    assert not {band["id"][0] for band in results["bands"]} & {"A", "B", "C"}
 
 
-def test_what_every_session_said_is_kept(rehearsed):
+def test_the_output_of_every_session_is_kept(rehearsed):
     assert "Complete." in (rehearsed[1] / "TF.log").read_text()
 
 
-def test_the_joints_of_another_arm_are_told_and_not_gated(tmp_path):
+def test_bands_at_another_friction_are_shown_and_not_gated(tmp_path):
     config = two_terrains(tmp_path)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(recording, "_record", in_this_process)
-        patch.setattr(recording, "_pool", lambda _: InThisThread())
+        patch.setattr(recording, "_pool", lambda _: ImmediateExecutor())
         done = traction(
             *("rehearse", "--trials", 1, "--friction", 1, "--jobs", 1),
             *("--config", config, "--data", tmp_path),
@@ -130,7 +130,9 @@ def test_the_joints_of_another_arm_are_told_and_not_gated(tmp_path):
 PLAN = AcceptancePlan(None, ("TF",), ("TF",), 0.4, 1, 3, FRICTION, 1)
 
 
-def test_an_arm_that_rubs_is_calibrated_first_and_compensated(tmp_path, monkeypatch):
+def test_an_arm_with_friction_is_calibrated_first_and_compensated(
+    tmp_path, monkeypatch
+):
     monkeypatch.setattr(recording, "_record", calibrated_at_once)
     plan = recording.calibrate_arm(PLAN, tmp_path)
     section = load_settings(plan.config).rig.friction
@@ -140,7 +142,7 @@ def test_an_arm_that_rubs_is_calibrated_first_and_compensated(tmp_path, monkeypa
 
 
 def calibrated_at_once(arguments, folder):
-    """Write what `calibrate` was asked for; do everything else."""
+    """Write the options of `calibrate` instead of calibrating; run everything else."""
     if arguments[0] != "calibrate":
         return in_this_process(arguments, folder)
     asked = dict(itertools.pairwise(arguments))
@@ -153,7 +155,7 @@ def calibrated_at_once(arguments, folder):
     "change",
     [{"friction": 0.02}, {"config": "a.toml"}],
 )
-def test_no_other_arm_is_calibrated(change, tmp_path):
+def test_an_arm_with_low_friction_or_own_settings_is_not_calibrated(change, tmp_path):
     plan = dataclasses.replace(PLAN, **change)
     assert recording.calibrate_arm(plan, tmp_path) is plan
     assert list(tmp_path.iterdir()) == []
@@ -173,7 +175,7 @@ def test_a_calibration_that_fails_ends_the_rehearsal(tmp_path, monkeypatch):
         ({"friction": 1.0}, set()),
     ],
 )
-def test_bands_on_slips_that_go_back_decide_where_nothing_rubs(change, deciding):
+def test_bands_on_backward_slips_decide_at_low_friction_only(change, deciding):
     results = [
         BandResult(Band(name, "what", 0, 1), (2.0,)) for name in ("D4", "D5", "E3")
     ]
@@ -182,31 +184,31 @@ def test_bands_on_slips_that_go_back_decide_where_nothing_rubs(change, deciding)
 
 
 @pytest.mark.parametrize("option", [("--trials", 0), ("--friction", 3), ("--jobs", 99)])
-def test_what_makes_no_sense_is_refused(option):
+def test_an_option_out_of_range_is_refused(option):
     done = traction("rehearse", *option)
     assert done.code == 2
     assert "Nothing was started." in done.err
 
 
 @pytest.mark.long
-def test_terrains_side_by_side_give_the_same_bits_as_one_by_one(tmp_path):
+def test_terrains_recorded_in_parallel_are_bit_identical_to_serial_ones(tmp_path):
     config = two_terrains(tmp_path)
-    found = []
+    results = []
     for jobs in (1, 2):
         data = tmp_path / str(jobs)
         traction(
             *("rehearse", "--trials", 2, "--jobs", jobs),
             *("--config", config, "--data", data),
         )
-        found.append(digests(data / "rehearsal_1"))
-    assert found[0] == found[1]
-    assert len(found[0]["TF"]) == 2
+        results.append(digests(data / "rehearsal_1"))
+    assert results[0] == results[1]
+    assert len(results[0]["TF"]) == 2
 
 
 @pytest.mark.long
 @pytest.mark.timeout(1800)
-def test_the_tares_predict_the_errors_of_eighty_trials(tmp_path):
+def test_the_tares_predict_the_errors_of_a_whole_study(tmp_path):
     traction("rehearse", "--seed", 11, "--data", tmp_path)
-    found = json.loads((tmp_path / "rehearsal_11" / "bands.json").read_text())
-    (ratio,) = next(b["values"] for b in found["bands"] if b["id"] == "T4")
+    results = json.loads((tmp_path / "rehearsal_11" / "bands.json").read_text())
+    (ratio,) = next(b["values"] for b in results["bands"] if b["id"] == "T4")
     assert 0.8 <= ratio <= 1.2

@@ -1,4 +1,4 @@
-"""The served arm as another program meets it, in real time with generous limits."""
+"""The served arm as another program sees it, in real time with generous limits."""
 
 import os
 import signal
@@ -17,14 +17,14 @@ from tests.ft_sensor.sensor_bench import MAKES
 
 pytestmark = pytest.mark.slow
 
-ABSENT = "23 did not come"  # of 31 ids asked for, seven pucks and the module are there
+ABSENT = "23 did not come"  # of 31 nodes polled, seven pucks and the module answer
 ANSWERS = f" 0 of them after more than 1 ms, {ABSENT}; 0 came without a request"
 PATIENCE = 30.0  # s, for a machine that stalls; met at once on one that does not
 
 
 @pytest.fixture
 def serve(tmp_path):
-    """Return a function that starts `traction fake` on the socket `tmp_path`/bus."""
+    """A function that starts `traction fake` on the socket `tmp_path`/bus."""
     running = []
 
     def start(*arguments):
@@ -83,7 +83,7 @@ def test_a_signal_ends_the_service_cleanly(serve, tmp_path, number):
     assert not (tmp_path / "bus").exists()
 
 
-def test_a_service_without_stdin_goes_on_until_a_signal_ends_it(tmp_path):
+def test_a_service_without_stdin_runs_until_a_signal(tmp_path):
     command = [sys.executable, "-m", "experiments", "fake", "--can"]
     with subprocess.Popen(
         [*command, f"traction-fake:{tmp_path}/bus", "--idle-first"],
@@ -100,19 +100,19 @@ def test_a_service_without_stdin_goes_on_until_a_signal_ends_it(tmp_path):
     assert not (tmp_path / "bus").exists()
 
 
-BEGINNINGS = {
+STARTS = {
     "background of a script": "{} </dev/null & echo $!; wait $!",
     "without stdin": "{} <&- & echo $!; wait $!",
     "nohup": "nohup {} 2>/dev/null & echo $!; wait $!",
 }
 
 
-@pytest.mark.parametrize("how", BEGINNINGS)
-def test_a_served_arm_of_a_shell_goes_on_until_sigterm(tmp_path, how):
+@pytest.mark.parametrize("how", STARTS)
+def test_an_arm_served_from_a_shell_runs_until_sigterm(tmp_path, how):
     serve = f"{sys.executable} -m experiments fake --idle-first --bare --firmware 60 "
     serve += f"--can traction-fake:{tmp_path}/bus"
     with subprocess.Popen(
-        ["bash", "-c", BEGINNINGS[how].format(serve)],
+        ["bash", "-c", STARTS[how].format(serve)],
         stdout=subprocess.PIPE,
         text=True,
         start_new_session=True,
@@ -129,7 +129,7 @@ def test_a_served_arm_of_a_shell_goes_on_until_sigterm(tmp_path, how):
     assert not (tmp_path / "bus").exists()
 
 
-def test_a_script_presses_and_quits_though_stdin_has_ended(tmp_path):
+def test_a_script_is_run_although_stdin_has_ended(tmp_path):
     script = tmp_path / "script"
     script.write_text("idle\n0.5 quit\n")
     log = tmp_path / "bus.log"
@@ -145,17 +145,17 @@ def test_a_script_presses_and_quits_though_stdin_has_ended(tmp_path):
         check=False,
     )
     assert (done.returncode, done.stderr) == (0, "")
-    assert " fake0 540#" in log.read_text()  # the safety module told of the change
+    assert " fake0 540#" in log.read_text()  # the safety module reported the change
 
 
 @pytest.mark.parametrize("where", ["can0", ":can0", "socketcan:"])
-def test_a_bus_is_named_by_interface_and_channel(where):
+def test_a_bus_without_interface_or_channel_is_refused(where):
     done = traction("fake", "--can", where)
     assert done.code == 2
     assert "INTERFACE:CHANNEL" in done.err
 
 
-def test_a_path_in_use_is_a_clear_error(tmp_path):
+def test_a_path_in_use_is_refused(tmp_path):
     with open_socket() as other:
         other.bind(f"{tmp_path}/bus")
         other.listen()
@@ -170,7 +170,7 @@ def test_an_interface_that_does_not_exist_is_a_link_error():
     assert "nothing:can0 cannot be opened" in done.err
 
 
-def test_a_script_that_makes_no_sense_starts_nothing(tmp_path):
+def test_an_invalid_script_line_starts_nothing(tmp_path):
     script = tmp_path / "script"
     script.write_text("idle\njump\n")
     where = f"traction-fake:{tmp_path}/bus"
@@ -180,7 +180,7 @@ def test_a_script_that_makes_no_sense_starts_nothing(tmp_path):
     assert not (tmp_path / "bus").exists()
 
 
-def test_check_logs_its_bus_and_replay_finds_every_answer(config, tmp_path):
+def test_check_logs_its_bus_and_replay_finds_every_reply(config, tmp_path):
     log = tmp_path / "bus.log"
     options = ("--config", config, "--data", tmp_path)
     assert traction("check", "--fake", "--fast", "--can-log", log, *options).code == 0
@@ -200,8 +200,8 @@ def test_a_session_logs_its_cycles(config, tmp_path):
     text = log.read_text()
     assert text.count(" fake0 404#30\n") > 500
     assert text.count(" fake0 402#AA") > 500
-    told = traction("replay", "--can", log, "--summary").out
-    assert ANSWERS in told
+    summary = traction("replay", "--can", log, "--summary").out
+    assert ANSWERS in summary
 
 
 def test_a_log_is_never_written_over_a_file(config, tmp_path):
@@ -213,7 +213,7 @@ def test_a_log_is_never_written_over_a_file(config, tmp_path):
     assert log.read_text() == "precious"
 
 
-def test_a_malformed_log_names_its_line(tmp_path):
+def test_malformed_lines_of_a_log_are_named(tmp_path):
     log = tmp_path / "bus.log"
     asked = "(1.000000) can0 404#30\n"
     log.write_text(f"\ufeff{asked}\x00\x01nonsense\n(2.12345678) can0 404#30\ncut (16")
@@ -226,7 +226,7 @@ def test_a_malformed_log_names_its_line(tmp_path):
     assert "2 frames, 0 of other kinds." in done.out
 
 
-def test_a_log_that_is_not_there_is_a_usage_error(tmp_path):
+def test_a_missing_log_is_a_usage_error(tmp_path):
     done = traction("replay", "--can", tmp_path / "none")
     assert done.code == 2
     assert "cannot be read" in done.err
@@ -247,11 +247,11 @@ def test_a_sensor_is_served_to_a_driver_in_another_process(tmp_path, kind):
         driver = make.device(PortSettings(str(path), make.baudrate, 0.5))
         sensor = SerialSensor(link, clock, driver)
         sensor.open()
-        found, end_ns = [], clock.now_ns() + int(PATIENCE * 1e9)
-        while not found and clock.now_ns() < end_ns:
+        samples, end_ns = [], clock.now_ns() + int(PATIENCE * 1e9)
+        while not samples and clock.now_ns() < end_ns:
             clock.wait(sensor, clock.now_ns() + 100_000_000)
-            found = sensor.poll(clock.now_ns())
-        newest = found[-1]
+            samples = sensor.poll(clock.now_ns())
+        newest = samples[-1]
         # the shipped foot of 0.45 kg hangs there; bias and noise 0.4 N rms
         assert newest.wrench[2] == pytest.approx(4.4, abs=2.0)
         sensor.close()
@@ -263,7 +263,7 @@ def test_a_sensor_is_served_to_a_driver_in_another_process(tmp_path, kind):
     assert not path.is_symlink()
 
 
-def test_nothing_to_serve_and_a_taken_path_are_named(tmp_path):
+def test_a_service_of_nothing_and_a_taken_path_are_refused(tmp_path):
     assert "nothing to serve" in traction("fake").err
     taken = tmp_path / "sensor"
     taken.write_text("")

@@ -1,4 +1,4 @@
-"""Commands that meet an arm on a bus that other programs can open too."""
+"""Commands refuse an arm that another program uses, and send no torque."""
 
 import json
 import os
@@ -40,13 +40,13 @@ SET_MODE = " fake0 00A#88"
 
 @pytest.fixture
 def config(tmp_path):
-    """Return settings of a real rig whose bus is served at `tmp_path`/bus."""
+    """Settings of a real rig whose bus is served at `tmp_path`/bus."""
     return served_config(tmp_path)
 
 
 @pytest.fixture
 def active_arm(tmp_path):
-    """Return a served arm that is active and needs no heartbeat, with its frames."""
+    """A served arm that is active, needs no heartbeat and records its frames."""
     clock = SystemClock()
     options = NetworkOptions(safety_mode=SafetyMode.ACTIVE, heartbeat_ns=10**15)
     motors = Motors(COUNTS)
@@ -58,7 +58,7 @@ def active_arm(tmp_path):
     is_over = threading.Event()
 
     def serve():
-        request(RealtimeRequest(60, None))  # where it may: a busy machine stalls it
+        request(RealtimeRequest(60, None))  # if permitted: a busy machine stalls it
         while not is_over.is_set():
             server.step(lambda can_id, data: server.frames.append((can_id, data)))
             while other.recv(0) is not None:
@@ -77,7 +77,7 @@ def active_arm(tmp_path):
 
 
 def refused(command, config, tmp_path, name):
-    """Run `command`; return what it prints, which is the message `name`."""
+    """Run `command`; its error output, which is the message `name`."""
     done = traction(*COMMANDS[command], "--config", config, "--data", tmp_path)
     assert done.code == 3, done.err
     assert name in SHARED_ARM
@@ -86,7 +86,7 @@ def refused(command, config, tmp_path, name):
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_a_lock_that_is_no_file_is_not_used(command, config, tmp_path):
+def test_a_lock_that_is_not_a_file_is_refused(command, config, tmp_path):
     lock = ArmLock("traction-fake", str(tmp_path / "bus"))
     lock.close()
     lock.path.unlink()
@@ -98,7 +98,7 @@ def test_a_lock_that_is_no_file_is_not_used(command, config, tmp_path):
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_an_arm_that_another_program_has_is_not_opened(command, config, tmp_path):
+def test_an_arm_locked_by_another_program_is_not_opened(command, config, tmp_path):
     lock = ArmLock("traction-fake", str(tmp_path / "bus"))
     try:
         err = refused(command, config, tmp_path, "arm-busy")
@@ -110,7 +110,7 @@ def test_an_arm_that_another_program_has_is_not_opened(command, config, tmp_path
 
 @pytest.mark.wall_clock
 @pytest.mark.parametrize("command", COMMANDS)
-def test_an_active_arm_is_asked_for_its_mode_and_left_active(
+def test_an_active_arm_is_only_asked_for_its_mode(
     command, config, tmp_path, active_arm
 ):
     refused(command, config, tmp_path, "arm-active")
@@ -121,7 +121,7 @@ def test_an_active_arm_is_asked_for_its_mode_and_left_active(
 
 @pytest.mark.wall_clock
 @pytest.mark.parametrize("command", COMMANDS)
-def test_another_master_is_heard_and_nothing_is_sent_to_its_arm(
+def test_nothing_is_sent_to_the_arm_of_another_master(
     command, config, tmp_path, active_arm
 ):
     active_arm.has_master = True
@@ -131,7 +131,7 @@ def test_another_master_is_heard_and_nothing_is_sent_to_its_arm(
 
 
 def patiently(*arguments):
-    """Run a command again while the served arm, which is not in time, seems silent."""
+    """Repeat a command while the served arm, which is not real-time, seems silent."""
     for _ in range(TRIES):
         done = traction(*arguments)
         if done.code == 0:
@@ -141,9 +141,7 @@ def patiently(*arguments):
 
 
 @pytest.mark.wall_clock
-def test_no_torque_and_no_mode_is_sent_while_the_arm_is_zeroed_checked_and_timed(
-    config, tmp_path
-):
+def test_zero_check_and_bench_send_no_torque_and_no_mode(config, tmp_path):
     log = tmp_path / "bus.log"
     served = subprocess.Popen(
         [

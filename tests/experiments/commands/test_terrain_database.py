@@ -1,4 +1,4 @@
-"""Models of recorded terrains for other programs, and what they recognise."""
+"""The terrain database has the models of recorded terrains and identifies trials."""
 
 import json
 
@@ -12,7 +12,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 
 @pytest.fixture(scope="module")
 def exported(tmp_path_factory):
-    """Return (data folder, database) of two short terrains, two trials each."""
+    """(data folder, database) of two short terrains, two trials each."""
     folder = tmp_path_factory.mktemp("exported")
     config = write_config(folder)
     for terrain in ("S0", "Tf"):
@@ -23,7 +23,7 @@ def exported(tmp_path_factory):
     return folder / "data", path
 
 
-def test_every_terrain_has_the_five_models_and_that_of_a_new_trial(exported):
+def test_every_terrain_has_all_models_and_that_of_a_new_trial(exported):
     database = load(exported[1])
     assert set(database.terrains) == {"S0", "Tf"}
     assert database.is_simulated
@@ -34,14 +34,14 @@ def test_every_terrain_has_the_five_models_and_that_of_a_new_trial(exported):
     assert 0.1 < database.terrain("Tf").predict(3.0, 0.05).mean < 2.0
 
 
-def test_a_recorded_trial_is_recognised(exported):
+def test_a_recorded_trial_is_identified(exported):
     data, path = exported
     (trial,) = data.glob("sessions/*_Tf.fake/trials/T02.mcap")
     done = traction("identify", trial, "--terrain-db", path, "--samples", 50)
     assert done.code == 0, done.err
     assert "0.5 s windows" in done.out
-    told = traction("identify", trial, "--terrain-db", path, "--samples", 50, "--json")
-    (answer,) = json.loads(told.out)
+    raw = traction("identify", trial, "--terrain-db", path, "--samples", 50, "--json")
+    (answer,) = json.loads(raw.out)
     assert answer["terrain"] == "Tf"
     assert answer["recognition"]["terrains"] == ["S0", "Tf"]
     assert answer["recognition"]["surface"] in {"flat", "rocky", "none"}
@@ -57,13 +57,13 @@ def test_a_database_is_never_overwritten(exported):
 
 
 @pytest.mark.parametrize("options", [(), ("--to", "x", "--terrain-db", "y")])
-def test_an_export_is_of_one_kind(options):
+def test_an_export_of_no_kind_or_two_kinds_is_refused(options):
     done = traction("export", "S001", *options)
     assert done.code == 2
     assert "Name one of the three" in done.err
 
 
-def test_a_file_that_is_no_database_is_refused(exported, tmp_path):
+def test_a_file_that_is_not_a_database_is_refused(exported, tmp_path):
     (tmp_path / "db.json").write_text("{}")
     done = traction("identify", exported[1], "--terrain-db", tmp_path / "db.json")
     assert done.code == 2

@@ -1,4 +1,4 @@
-"""Choices that the program refuses before it reads a single trial."""
+"""Unknown choices of `--what-if` are refused before a trial is read."""
 
 import pytest
 
@@ -6,7 +6,7 @@ from tests.experiments.program import traction
 
 
 @pytest.mark.parametrize("text", ["colour=red", "smoothing=4", "frame=base", "window"])
-def test_choices_that_there_are_not_are_refused_with_the_list(tmp_path, text):
+def test_unknown_choices_are_refused_with_the_list(tmp_path, text):
     done = traction("report", "--all", "--data", tmp_path, "--what-if", text)
     assert done.code != 0
     assert "--what-if" in done.err

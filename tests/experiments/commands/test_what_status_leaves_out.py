@@ -1,4 +1,4 @@
-"""An empty table says why it is empty; a session that is open elsewhere says so."""
+"""Status names the sessions that its table leaves out, and says why it is empty."""
 
 import json
 import shutil
@@ -12,7 +12,7 @@ from tests.experiments.program import only_session, traction
 
 @pytest.fixture
 def data(recorded, tmp_path):
-    """Return a copy of a data folder with one session."""
+    """A copy of a data folder with one session."""
     shutil.copytree(recorded.data, tmp_path / "data")
     return tmp_path / "data"
 
@@ -23,7 +23,7 @@ def status(config, data, *options):
     return done
 
 
-def test_a_whole_board_has_no_remarks(config, data):
+def test_a_complete_status_table_has_no_remarks(config, data):
     assert status(config, data).err == ""
 
 
@@ -33,22 +33,22 @@ def test_a_data_folder_that_does_not_exist_is_named(config, tmp_path):
     assert f"no data folder {tmp_path / 'typo'}" in done.err
 
 
-def test_a_data_folder_without_sessions_is_said_to_have_none(config, tmp_path):
+def test_a_data_folder_without_sessions_is_reported(config, tmp_path):
     assert "no sessions" in status(config, tmp_path).err
 
 
-def test_a_renamed_session_is_said_to_be_left_out(config, data):
+def test_a_renamed_session_is_reported(config, data):
     folder = only_session(data)
     renamed = folder.rename(folder.with_name("my best session"))
     assert str(renamed) in status(config, data).err
 
 
-def test_a_session_of_an_unknown_terrain_is_said_to_be_left_out(config, tmp_path):
+def test_a_session_of_an_unknown_terrain_is_reported(config, tmp_path):
     create_session(tmp_path, "MOON", is_simulated=True, utc_ns=0)
     assert "MOON is not a terrain of the matrix" in status(config, tmp_path).err
 
 
-def test_a_session_renamed_to_another_terrain_is_damaged(config, data):
+def test_a_session_renamed_to_another_terrain_is_reported_as_damaged(config, data):
     folder = only_session(data)
     folder.rename(folder.with_name(folder.name.replace("TF", "MOON")))
     done = traction("status", "--config", config, "--data", data)
@@ -57,7 +57,7 @@ def test_a_session_renamed_to_another_terrain_is_damaged(config, data):
     assert "events.jsonl is of TF: a renamed session" in done.err
 
 
-def test_a_condition_that_matches_nothing_is_said(config, data):
+def test_a_condition_that_matches_nothing_is_reported(config, data):
     done = status(config, data, "--where", "terrain=TF,stones=big", "--json")
     assert "Nothing matches --where terrain=TF,stones=big" in done.err
     assert json.loads(done.out) == []

@@ -1,4 +1,4 @@
-"""The program as a process of its own, and its report: by hand, they take a minute."""
+"""The program as a process of its own, and its report."""
 
 import json
 import signal
@@ -14,7 +14,7 @@ pytestmark = [pytest.mark.long, pytest.mark.timeout(300)]
 
 
 def start(config, data, *more):
-    """Start a simulated session and return the process."""
+    """Start a simulated session; its process."""
     options = ("--fake", "--fast", "--trials", "9", "--config", config, "--data", data)
     return subprocess.Popen(
         [
@@ -56,7 +56,7 @@ def test_ctrl_c_in_a_running_trial_closes_it_and_keeps_the_earlier_one(
     assert not list(folder.rglob("*.partial"))
 
 
-def test_a_reader_that_went_away_ends_the_session_unfinished(config, tmp_path):
+def test_a_closed_output_ends_the_session_unfinished(config, tmp_path):
     with start(config, tmp_path) as process:
         wait_for(process, "trial 1 of 9")
         process.stdout.close()
@@ -64,7 +64,7 @@ def test_a_reader_that_went_away_ends_the_session_unfinished(config, tmp_path):
     assert journal(only_session(tmp_path))[-1]["reason"] == "unfinished"
 
 
-def test_a_session_killed_at_once_leaves_the_earlier_trial_as_it_was(config, tmp_path):
+def test_a_killed_session_leaves_the_earlier_trial_intact(config, tmp_path):
     with start(config, tmp_path) as process:
         wait_for(process, "trial 2 of 9")
         process.kill()
@@ -73,7 +73,7 @@ def test_a_session_killed_at_once_leaves_the_earlier_trial_as_it_was(config, tmp
     assert verify_file(path).sha256 == sidecar(path)["sha256"]
 
 
-def test_the_report_of_a_session_is_marked_as_simulated_and_compares_with_the_truth(
+def test_a_report_is_marked_as_simulated_and_compares_with_the_truth(
     recorded,
 ):
     done = traction("report", "S001", "--data", recorded.data)

@@ -6,12 +6,12 @@ from experiments.__main__ import main
 from tests.experiments.program import traction, write_config
 
 
-def test_zero_defines_the_home_position_when_told_that_it_is_so(capsys):
+def test_zero_defines_the_home_position_if_confirmed(capsys):
     assert main(["zero", "--fake", "--yes"]) == 0
     assert "positions defined at home" in capsys.readouterr().out
 
 
-def test_zero_without_a_person_changes_nothing(capsys, monkeypatch):
+def test_zero_without_a_terminal_changes_nothing(capsys, monkeypatch):
     monkeypatch.setattr("sys.stdin.isatty", lambda: False, raising=False)
     assert main(["zero", "--fake"]) == 2
     seen = capsys.readouterr()
@@ -19,7 +19,7 @@ def test_zero_without_a_person_changes_nothing(capsys, monkeypatch):
     assert "positions defined" not in seen.out
 
 
-def test_any_other_word_changes_nothing(capsys, monkeypatch):
+def test_zero_without_confirmation_changes_nothing(capsys, monkeypatch):
     class Keyboard:
         def isatty(self):
             return True
@@ -34,10 +34,10 @@ def test_any_other_word_changes_nothing(capsys, monkeypatch):
 
 @pytest.fixture(scope="module")
 def noted():
-    """Return what the simulated arm's encoders say, as the first zeroing tells it."""
+    """Absolute encoder counts of the simulated arm, printed by the first zeroing."""
     done = traction("zero", "--fake", "--yes")
-    found = re.search(r"mech_at_home = (\[[\d, ]+\])", done.out)
-    return [int(number) for number in found[1].strip("[]").split(",")]
+    match = re.search(r"mech_at_home = (\[[\d, ]+\])", done.out)
+    return [int(number) for number in match[1].strip("[]").split(",")]
 
 
 def zero_with(folder, mech):
@@ -46,7 +46,7 @@ def zero_with(folder, mech):
     return traction("zero", "--fake", "--yes", "--config", config)
 
 
-def test_the_absolute_encoders_are_told_to_check_the_next_zeroing(noted):
+def test_zero_prints_the_counts_of_the_absolute_encoders(noted):
     assert len(noted) == 7
     assert all(0 <= count < 4096 for count in noted)
 
@@ -65,7 +65,7 @@ def test_an_arm_that_is_not_at_its_old_home_is_not_zeroed(noted, tmp_path):
     assert "positions defined" not in done.out
 
 
-def test_encoders_that_are_none_are_refused_by_the_settings(noted, tmp_path):
+def test_an_invalid_encoder_count_in_the_settings_is_refused(noted, tmp_path):
     done = zero_with(tmp_path, [*noted[:6], -1])
     assert done.code == 2
     assert "arm.mech_at_home" in done.err

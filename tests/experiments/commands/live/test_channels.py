@@ -31,7 +31,7 @@ def messages(seed=1):
     return LiveEncoder(URDF, CONFIG).messages(cycle(seed)[0], T_NS)
 
 
-def test_every_field_of_a_cycle_arrives_as_it_was():
+def test_every_field_of_a_cycle_arrives_unchanged():
     message = decode(CYCLE.type_name, messages()["/cycle"])
     for name in numbers_of(CYCLE):
         ours = cycle()[name][0]
@@ -41,9 +41,9 @@ def test_every_field_of_a_cycle_arrives_as_it_was():
     assert (stamp.sec, stamp.nanosec) == divmod(T_NS, 10**9)
 
 
-def test_a_sample_gives_every_topic_that_follows_from_it():
-    rest = {"/robot_description", "/events"}
-    assert set(messages()) == set(LIVE_TOPICS) - rest
+def test_a_sample_gives_every_topic_but_description_and_events():
+    separate = {"/robot_description", "/events"}
+    assert set(messages()) == set(LIVE_TOPICS) - separate
     for topic, payload in messages().items():
         decode(LIVE_TOPICS[topic], payload)
 
@@ -60,7 +60,7 @@ def matrix(transform):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_links_stand_where_the_arm_model_has_them(seed):
+def test_link_frames_agree_with_the_arm_model(seed):
     q = np.random.default_rng(seed).uniform(-1.0, 1.0, 7)
     at, turned = np.zeros(3), np.eye(3)
     names = []
@@ -74,7 +74,7 @@ def test_the_links_stand_where_the_arm_model_has_them(seed):
     assert turned == pytest.approx(rotation, abs=1e-12)
 
 
-def test_transforms_are_a_tree_with_sensor_and_foot():
+def test_transforms_include_tool_sensor_and_foot():
     message = decode(LIVE_TOPICS["/tf"], messages()["/tf"])
     frames = {t.child_frame_id: t for t in message.transforms}
     assert {"wam_l7", "wam_tool", "ft_sensor", "foot"} <= set(frames)
@@ -87,7 +87,7 @@ def test_transforms_are_a_tree_with_sensor_and_foot():
 
 
 @pytest.mark.parametrize("type_name", sorted(set(LIVE_TOPICS.values())))
-def test_a_definition_has_names_that_ros_2_allows(type_name):
+def test_field_names_of_a_definition_are_valid_in_ros_2(type_name):
     for line in schema_text(type_name).splitlines():
         words = line.split("#")[0].split()
         if len(words) == 2 and words[0] != "MSG:" and "=" not in words[1]:
@@ -95,7 +95,7 @@ def test_a_definition_has_names_that_ros_2_allows(type_name):
 
 
 def paths_of(node):
-    """Yield every path of a plot in the shipped layout."""
+    """Every path of a plot below a node of the layout."""
     if isinstance(node, dict):
         if "timestampMethod" in node:
             yield node["value"]
@@ -110,14 +110,14 @@ LAYOUT = json.loads(layout_path().read_text())
 
 
 @pytest.mark.parametrize("path", list(paths_of(LAYOUT)))
-def test_the_layout_that_is_shipped_plots_fields_that_are_recorded(path):
+def test_the_shipped_layout_plots_recorded_fields(path):
     match = re.fullmatch(r"/cycle\.(\w+)(?:\[(\d+)\])?", path)
     shape = CYCLE.dtype[match[1]].shape
     assert bool(shape) is (match[2] is not None)
     assert not shape or int(match[2]) < shape[0]
 
 
-def test_the_layout_shows_arm_events_and_ten_series():
+def test_the_layout_shows_arm_events_and_plots():
     text = json.dumps(LAYOUT)
     assert all(topic in LIVE_TOPICS for topic in re.findall(r'"(/[\w/]+)"', text))
     assert {"ThreeDee", "Log", "Plot"} <= set(re.findall(r'"panelType": "(\w+)"', text))

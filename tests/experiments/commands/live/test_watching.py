@@ -1,4 +1,4 @@
-"""A session in another process looked at through its memory; nothing can be written."""
+"""A session in another process is watched through its shared memory, read-only."""
 
 import os
 import struct
@@ -43,7 +43,7 @@ def folder(tmp_path):
 
 
 def written(shared, seed):
-    """Write a cycle of now and return its record."""
+    """Write a cycle with the present time; its record."""
     record = filled(CYCLE, seed)
     record["host_ns"] = SystemClock().now_ns()
     shared.cycles.write(record.tobytes())
@@ -64,11 +64,11 @@ def test_the_memory_of_a_process_is_found_and_cannot_be_written(shared):
     looked_up.close()
 
 
-def test_of_several_memories_the_newest_is_looked_at(shared):
+def test_the_newest_of_several_memories_is_read(shared):
     written(shared, 1)
     newer = SharedLayout.create()
     record = written(newer, 2)
-    words = os.memfd_create("traction-control")  # what a process says goes there
+    words = os.memfd_create("traction-control")  # another memory of a process
     looked_up = SharedLayout.of_process(os.getpid())
     assert looked_up.cycles.last(1).tobytes() == record.tobytes()
     looked_up.close()
@@ -76,11 +76,11 @@ def test_of_several_memories_the_newest_is_looked_at(shared):
     os.close(words)
 
 
-def test_a_process_without_memory_or_that_has_gone_gives_none():
+def test_a_process_that_does_not_exist_gives_none():
     assert SharedLayout.of_process(2**22 + 1) is None
 
 
-def test_memory_that_is_being_made_is_none_yet():
+def test_memory_that_is_being_created_gives_none():
     descriptor = os.memfd_create("traction")
     assert SharedLayout.of_process(os.getpid()) is None
     os.truncate(descriptor, 4096)
@@ -121,7 +121,7 @@ def test_new_entries_of_the_journal_become_events(shared, folder):
     assert session.events(8) == []
 
 
-def test_an_event_says_its_details():
+def test_the_text_of_an_event_has_its_details():
     assert event_text({"event": "noted", "utc": "z", "text": "wet"}) == "noted text wet"
 
 
@@ -166,15 +166,15 @@ def test_a_viewer_sees_a_running_session(tmp_path, shared, folder, capsys):
 
 
 def _port(capsys, words="Layout"):
-    """Wait until the server has said `words`, and return where it listens."""
-    said, clock = "", SystemClock()
-    while words not in said:
+    """Wait until the server has printed `words`; its port."""
+    output, clock = "", SystemClock()
+    while words not in output:
         clock.sleep_until(clock.now_ns() + 5_000_000)
-        said += capsys.readouterr().out
-    return int(said.partition("ws://127.0.0.1:")[2].split()[0].rstrip("."))
+        output += capsys.readouterr().out
+    return int(output.partition("ws://127.0.0.1:")[2].split()[0].rstrip("."))
 
 
-def test_a_port_that_is_taken_is_a_clear_refusal():
+def test_a_port_in_use_is_refused():
     server = LiveServer(0, LIVE_TOPICS)
     try:
         with pytest.raises(SettingsError, match=f"Port {server.port}"):
@@ -183,7 +183,7 @@ def test_a_port_that_is_taken_is_a_clear_refusal():
         server.close()
 
 
-def test_a_viewer_that_seeks_gets_what_is_there(first_trial, capsys):
+def test_a_viewer_that_seeks_gets_the_samples_from_there(first_trial, capsys):
     over = threading.Event()
     args = (first_trial, 1.0, 0, SystemClock(), Console(), over.is_set)
     thread = threading.Thread(target=serve, args=args)

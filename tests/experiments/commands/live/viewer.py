@@ -23,14 +23,14 @@ _PATIENCE = 5.0  # s for an answer of the server
 
 @dataclass
 class Viewer:
-    """Subscribes to every channel and keeps what it gets.
+    """Subscribes to every channel and records what it receives.
 
     Attributes:
-        port: of the server on this computer.
-        info: of the server.
-        channels: as advertised, by topic.
+        port: port of the server on this computer.
+        info: serverInfo message.
+        channels: advertised channels, by topic.
         messages: (ns, payload) by topic, in order.
-        times: what the server said of the time [ns].
+        times: times sent by the server [ns].
         others: other binary messages.
     """
 
