@@ -21,7 +21,7 @@ def test_a_path_longer_than_the_terminal_stays_whole():
 
 @pytest.mark.parametrize("width", [58, 60, 62, 64, 80])
 @pytest.mark.parametrize("state", ["holding", "UNKNOWN - support it", "damping"])
-def test_what_the_arm_does_is_never_on_another_line(width, state):
+def test_the_state_of_the_arm_stays_on_the_line_of_its_label(width, state):
     text = f"T02 stopped at 2.0 s: F/T sample 21 ms old (limit 20). ARM: {state}. Push."
     lines = wrapped(text, width).split("\n")
     assert " ".join(lines) == text

@@ -13,7 +13,7 @@ REST = 3.0  # N, of a foot that rests on the ground
 
 
 def pressed(*presses, lasts=3.0, rest=REST, force=12.0):
-    """Return (t, F_n, v_t) with `presses` of (beginning, duration) [s]."""
+    """(t, F_n, v_t) with `presses` of (start, duration) [s]."""
     t = np.arange(0.0, lasts, 1 / RATE)
     F_n = np.full(len(t), rest)
     for begin, duration in presses:
@@ -22,7 +22,7 @@ def pressed(*presses, lasts=3.0, rest=REST, force=12.0):
 
 
 def is_tap(t, F_n, v_t, portion=10):
-    """Feed samples as the console gets them, twenty milliseconds at a time."""
+    """Whether samples, fed twenty milliseconds at a time, are a double tap."""
     watch = DoubleTap()
     parts = range(0, len(t), portion)
     fed = [slice(max(0, i - 7), i + portion) for i in parts]  # some seen twice
@@ -30,36 +30,36 @@ def is_tap(t, F_n, v_t, portion=10):
 
 
 @pytest.mark.parametrize(
-    ("presses", "found"),
+    ("presses", "expected"),
     [
         ([(0.5, 0.1), (0.9, 0.1)], True),
         ([(0.5, 0.1), (1.49, 0.1)], True),
         ([(0.5, 0.1), (1.52, 0.1)], False),  # more than a second apart
         ([(0.5, 0.1), (1.6, 0.1), (2.2, 0.1)], True),  # the second one begins anew
         ([(0.5, 0.1)], False),
-        ([(0.5, 0.5), (1.1, 0.1)], False),  # leaning on it is no tap
+        ([(0.5, 0.5), (1.1, 0.1)], False),  # leaning on the foot is no tap
         ([(0.5, 0.1), (0.8, 0.5)], False),
         ([(0.5, 0.01), (0.9, 0.01)], False),  # a knock on the frame
         ([], False),
     ],
 )
-def test_two_short_presses_within_a_second_are_a_double_tap(presses, found):
-    assert is_tap(*pressed(*presses)) is found
+def test_two_short_presses_in_quick_succession_are_a_double_tap(presses, expected):
+    assert is_tap(*pressed(*presses)) is expected
 
 
-def test_a_press_counts_beyond_eight_newtons_only():
+def test_a_press_counts_beyond_a_force_only():
     presses = [(0.5, 0.1), (0.9, 0.1)]
     assert not is_tap(*pressed(*presses, force=7.9))
     assert is_tap(*pressed(*presses, force=8.1))
 
 
-def test_the_foot_must_be_let_go_in_between():
+def test_the_foot_must_be_released_between_two_presses():
     presses = [(0.5, 0.1), (0.9, 0.1)]
     assert not is_tap(*pressed(*presses, rest=5.1))
     assert is_tap(*pressed(*presses, rest=4.9))
 
 
-def test_a_foot_that_slides_is_pushed_and_not_tapped():
+def test_a_sliding_foot_is_no_double_tap():
     t, F_n, v_t = pressed((0.5, 0.1), (0.9, 0.1))
     v_t[(t > 0.7) & (t < 0.72)] = 0.06
     assert not is_tap(t, F_n, v_t)
@@ -67,16 +67,16 @@ def test_a_foot_that_slides_is_pushed_and_not_tapped():
     assert is_tap(t, F_n, v_t)
 
 
-def test_values_that_are_no_numbers_are_no_taps():
+def test_samples_of_nan_are_no_double_tap():
     t, F_n, v_t = pressed((0.5, 0.1), (0.9, 0.1))
     assert not is_tap(t, np.full_like(F_n, np.nan), v_t)
     assert not is_tap(t, F_n, np.full_like(v_t, np.nan))
 
 
-def test_a_normal_push_never_counts(recorded):
-    """Nor one that presses five times as hard, so that all of it is a press.
+def test_a_normal_push_is_no_double_tap(recorded):
+    """Nor is a push five times as hard, which is one long press.
 
-    One that presses twice as hard comes in presses and pauses where the arm sticks.
+    A push twice as hard would come in presses and pauses where the arm sticks.
     """
     for name in ("T01", "T02"):
         path = recorded.folder / "trials" / f"{name}.mcap"
@@ -91,7 +91,7 @@ def test_a_normal_push_never_counts(recorded):
             assert not is_tap(host_ns * 1e-9, shown, v_t)
 
 
-def test_a_stick_slip_push_never_counts():
+def test_a_stick_slip_push_is_no_double_tap():
     """Load and speed of a foot that slips five times a second and sticks between."""
     t = np.arange(0.0, 10.0, 1 / RATE)
     phase = t * 5.0 % 1.0
@@ -101,7 +101,7 @@ def test_a_stick_slip_push_never_counts():
 
 
 def tapping(asked, rig):
-    """Press nothing where the foot can say it; tap it twice with a finger."""
+    """Tap the foot twice with a finger where a double tap replaces a key."""
     if asked.prompt not in {Prompt.READY, Prompt.REVIEW}:
         return " " if asked.prompt is Prompt.RECORDING and asked.since > 0.3 else None
     since = asked.since - 2.0
@@ -122,7 +122,7 @@ def test_a_double_tap_starts_a_trial_and_keeps_it(handsfree, tmp_path):
     assert [e["event"] for e in journal(seen.folder)].count("trial-kept") == 1
 
 
-def test_without_the_setting_a_foot_is_no_key(config, tmp_path):
+def test_without_the_setting_a_double_tap_does_nothing(config, tmp_path):
     seen = run_watched(config, tmp_path, 1, press=tapping)
     assert seen.done.code == 5
     assert "trial-started" not in [e["event"] for e in journal(seen.folder)]

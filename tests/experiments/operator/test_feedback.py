@@ -20,21 +20,21 @@ from experiments.settings.rig import OperatorSection
 
 
 class Terminal(io.StringIO):
-    """A standard output that a person looks at."""
+    """A standard output that is a terminal."""
 
     def isatty(self):
         return True
 
 
 class Words:
-    """A speaker that only remembers."""
+    """A speaker that only records its words."""
 
     def __init__(self):
-        self.said = []
+        self.spoken = []
         self.is_closed = False
 
     def say(self, words):
-        self.said.append(words)
+        self.spoken.append(words)
 
     def close(self):
         self.is_closed = True
@@ -66,11 +66,11 @@ def test_cues_are_spoken_in_fixed_words_and_end_with_the_session():
     for cue in FeedbackSignal:
         feedback.give(cue)
     feedback.close()
-    assert words.said == ["recording", "slower", "done"]
+    assert words.spoken == ["recording", "slower", "done"]
     assert words.is_closed
 
 
-def test_nobody_speaks_unless_asked(monkeypatch):
+def test_cues_are_spoken_only_if_set(monkeypatch):
     monkeypatch.setattr(
         "experiments.operator.feedback.find_speech", lambda: "/bin/speak"
     )
@@ -88,7 +88,7 @@ def test_nobody_speaks_unless_asked(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("installed", "found"),
+    ("installed", "path"),
     [
         ({"say", "espeak"}, "/bin/espeak"),
         ({"espeak-ng", "spd-say"}, "/bin/spd-say"),
@@ -96,17 +96,17 @@ def test_nobody_speaks_unless_asked(monkeypatch):
         (set(), None),
     ],
 )
-def test_the_first_speech_program_that_is_installed_speaks(installed, found):
-    assert find_speech(lambda n: f"/bin/{n}" if n in installed else None) == found
+def test_the_first_installed_speech_program_is_used(installed, path):
+    assert find_speech(lambda n: f"/bin/{n}" if n in installed else None) == path
 
 
 @pytest.fixture
 def program(tmp_path):
-    """Return a program that writes its words and its session down and stays."""
+    """A program that writes down its words and its session, and keeps running."""
     path = tmp_path / "speak"
     path.write_text(
         f"#!{sys.executable}\nimport os, sys, time\n"
-        f"with open({str(tmp_path / 'said')!r}, 'w') as file:\n"
+        f"with open({str(tmp_path / 'spoken')!r}, 'w') as file:\n"
         "    file.write(f'{os.getsid(0) == os.getpid()} {sys.argv[1:]}')\n"
         "print('heard', flush=True)\ntime.sleep(60)\n"
     )
@@ -116,7 +116,7 @@ def program(tmp_path):
 
 @pytest.fixture
 def started(monkeypatch):
-    """Return the speech programs that are started from now on."""
+    """The speech programs that are started during the test."""
     programs = []
     usual = subprocess.Popen
 
@@ -128,7 +128,7 @@ def started(monkeypatch):
     return programs
 
 
-def test_words_reach_the_program_without_a_shell_in_a_session_of_its_own(
+def test_words_reach_the_program_without_a_shell_in_its_own_session(
     program, tmp_path, monkeypatch
 ):
     started = []
@@ -144,11 +144,11 @@ def test_words_reach_the_program_without_a_shell_in_a_session_of_its_own(
     with started[0].stdout as heard:
         assert heard.readline() == b"heard\n"
     speech.close()
-    assert (tmp_path / "said").read_text() == "True ['slower; touch /tmp/x']"
+    assert (tmp_path / "spoken").read_text() == "True ['slower; touch /tmp/x']"
     assert started[0].returncode == -9  # ended, not waited for
 
 
-def test_new_words_cut_the_old_ones_short(program, started):
+def test_new_words_end_the_old_ones(program, started):
     speech = SpeechOutput(str(program))
     speech.say("recording")
     speech.say("done")
@@ -160,7 +160,7 @@ def test_new_words_cut_the_old_ones_short(program, started):
     assert second.returncode == -9
 
 
-def test_a_speech_program_that_cannot_start_stops_nobody(tmp_path, started):
+def test_a_speech_program_that_cannot_start_raises_nothing(tmp_path, started):
     speech = SpeechOutput(str(tmp_path / "gone"))
     speech.say("recording")
     assert started == []
@@ -173,10 +173,10 @@ def too_fast(speeds, dt=0.02):
     return [i * dt for i, x in enumerate(path) if watch.is_too_fast(i * dt, float(x))]
 
 
-def test_a_second_beyond_the_limit_is_too_fast_and_told_once_a_second():
-    told = too_fast([0.25] * 200)
-    assert told[0] == pytest.approx(1.02, abs=0.03)
-    assert np.diff(told).min() > 1.0
+def test_a_sustained_fast_push_is_reported_at_a_limited_rate():
+    times = too_fast([0.25] * 200)
+    assert times[0] == pytest.approx(1.02, abs=0.03)
+    assert np.diff(times).min() > 1.0
 
 
 def test_a_usual_push_with_slips_is_not_too_fast():
@@ -184,6 +184,6 @@ def test_a_usual_push_with_slips_is_not_too_fast():
     assert too_fast(slip * 20) == []
 
 
-def test_the_limit_is_a_fifth_of_a_metre_per_second():
+def test_a_push_is_too_fast_beyond_the_limit_only():
     assert too_fast([0.19] * 200) == []
     assert too_fast([0.21] * 200)

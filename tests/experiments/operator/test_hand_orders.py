@@ -1,4 +1,4 @@
-"""Lines that order the hands at a served arm."""
+"""Lines that order the simulated hands at a served arm."""
 
 import os
 
@@ -36,12 +36,12 @@ ZEROS = (0.0,) * 6
         ("release", ReleaseOrder()),
     ],
 )
-def test_a_line_is_an_order(line, order):
+def test_a_valid_line_is_parsed_into_its_order(line, order):
     assert parse_hand_order(line.split()) == order
 
 
 @pytest.mark.parametrize("line", ["", "activate", "fly 1 2", "7 low"])
-def test_other_lines_are_none_of_the_hands(line):
+def test_other_lines_are_not_hand_orders(line):
     assert parse_hand_order(line.split()) is None
 
 
@@ -66,15 +66,15 @@ def test_other_lines_are_none_of_the_hands(line):
         ("release it", "expected release"),
     ],
 )
-def test_a_line_that_is_no_order_says_why(line, cause):
+def test_an_invalid_order_is_refused_with_its_cause(line, cause):
     with pytest.raises(HandOrderError, match=cause):
         parse_hand_order(line.split())
 
 
 @given(st.sampled_from(HAND_WORDS), st.lists(st.text(max_size=8), max_size=9))
-def test_no_line_does_more_than_be_refused(word, rest):
+def test_any_line_is_an_order_or_refused(word, arguments):
     try:
-        order = parse_hand_order([word, *rest])
+        order = parse_hand_order([word, *arguments])
     except HandOrderError:
         return
     assert order is not None
@@ -89,7 +89,7 @@ def test_a_script_mixes_buttons_and_hands():
     )
 
 
-def test_stdin_orders_the_hands_and_says_what_is_wrong():
+def test_stdin_orders_the_hands_and_names_invalid_lines():
     read, write = os.pipe()
     pendant = Pendant(None, Lines(read), 0)
     os.write(write, b"stop 6 high\nhang much\nidle\n")

@@ -1,4 +1,4 @@
-"""The one table of keys, and everything that follows from it."""
+"""Screens, scripts, help and docs agree with the table of keys."""
 
 import argparse
 import re
@@ -41,7 +41,7 @@ def script_line(prompt, word):
 
 
 @pytest.mark.parametrize("row", key_rows())
-def test_the_table_of_keys_on_the_page_is_this_one(row):
+def test_every_row_of_the_table_of_keys_is_on_the_page(row):
     assert row in PAGE.read_text().splitlines()
 
 
@@ -70,13 +70,13 @@ def test_every_word_of_a_script_is_in_help_page_and_refusal(tmp_path, prompt, wo
 
 
 @pytest.mark.parametrize("prompt", KEYS)
-def test_every_key_of_a_prompt_does_one_thing(prompt):
+def test_every_key_of_a_prompt_has_one_action(prompt):
     keys = [entry.key for entry in KEYS[prompt]]
     assert len(set(keys)) == len(keys)
 
 
 @pytest.mark.parametrize("prompt", KEYS)
-def test_what_the_automatic_operator_presses_means_something(prompt):
+def test_the_automatic_operator_presses_only_keys_of_the_prompt(prompt):
     key = AutoOperator().answer(state(prompt))
     assert not key or key_action(prompt, key) is not None
 
@@ -98,7 +98,7 @@ def test_only_the_key_of_a_redo_waits_for_a_digit():
     assert waiting == {(Prompt.REVIEW, "r")}
 
 
-def test_a_key_without_meaning_does_nothing():
+def test_a_key_of_another_prompt_has_no_action():
     assert key_action(Prompt.READY, "k") is None
     assert key_action(Prompt.NOTE, "n") is None
 

@@ -39,7 +39,7 @@ SHOWN_AT = {
     "run/verdicts.py": {Prompt.REVIEW, Prompt.UNDO},
     "run/tare.py": {Prompt.SUPPORT},
 }
-UNITS = ("report/", "export/", "commands/fake.py")  # [m] and [s] are no keys there
+UNITS = ("report/", "export/", "commands/fake.py")  # [m] and [s] are units there
 
 
 def keys_named(text):
@@ -47,7 +47,7 @@ def keys_named(text):
 
 
 def exists(prompt, key):
-    """Return whether a key, as a text names it, does something at a prompt."""
+    """Whether a key, as a text names it, has an action at a prompt."""
     return any(
         key_action(prompt, key + digit) is not None for digit in ("", *REJECT_REASONS)
     )
@@ -55,8 +55,8 @@ def exists(prompt, key):
 
 @cache
 def texts():
-    """Return (module, text) of every text in the code that names a key."""
-    found = []
+    """(module, text) of every text in the code that names a key."""
+    pairs = []
     for path in sorted(CODE.rglob("*.py")):
         if str(path.relative_to(CODE)).startswith(UNITS):
             continue
@@ -68,8 +68,8 @@ def texts():
         for node in ast.walk(tree):
             is_text = isinstance(node, ast.Constant) and isinstance(node.value, str)
             if is_text and id(node) not in docs and keys_named(node.value):
-                found.append((str(path.relative_to(CODE)), node.value))
-    return found
+                pairs.append((str(path.relative_to(CODE)), node.value))
+    return pairs
 
 
 def test_a_text_of_the_program_names_keys_of_its_screen():
@@ -94,14 +94,14 @@ def test_a_message_names_keys_of_the_prompt_that_follows(name):
 
 
 @pytest.mark.parametrize("prompt", AFTER_FAULT)
-def test_how_a_session_goes_on_after_a_fault_names_keys_that_are_there(prompt):
+def test_the_continuation_after_a_fault_names_existing_keys(prompt):
     named = keys_named(AFTER_FAULT[prompt])
     assert bool(named) is (prompt is not None)
     assert all(exists(prompt, key) for key in named)
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_only_a_fault_that_leaves_the_session_open_says_how_it_goes_on(fault):
+def test_only_a_fault_that_leaves_the_session_open_says_how_to_continue(fault):
     leaves_open = FAULTS[fault].actions[-1] in {
         Action.END_TRIAL,
         Action.HOLD,
@@ -111,7 +111,7 @@ def test_only_a_fault_that_leaves_the_session_open_says_how_it_goes_on(fault):
         assert leaves_open
 
 
-def test_a_key_that_is_nowhere_would_be_found():
+def test_a_key_that_does_not_exist_is_detected():
     assert keys_named("then [r]edo, [space] or [2]") == ["r", " ", "2"]
     assert exists(Prompt.REVIEW, "r")
     assert not exists(Prompt.READY, "r")

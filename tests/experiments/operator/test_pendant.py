@@ -42,18 +42,18 @@ def test_a_script_has_times_and_buttons():
         "stop 8 low",
     ],
 )
-def test_a_line_that_is_no_press_is_named(line):
+def test_an_invalid_line_is_named(line):
     with pytest.raises(SettingsError, match="line 2"):
         parse_script(f"1 idle\n{line}")
 
 
-def test_times_that_run_back_are_refused():
+def test_decreasing_times_are_refused():
     with pytest.raises(SettingsError, match="line 2"):
         parse_script("2 idle\n1 activate")
 
 
 @given(st.text(max_size=60))
-def test_no_script_does_more_than_be_refused(text):
+def test_any_script_is_in_order_or_refused(text):
     try:
         presses = parse_script(text)
     except SettingsError:
@@ -68,7 +68,7 @@ def pipe():
         yield reader.fileno(), writer
 
 
-def test_lines_are_whole_before_they_count(pipe):
+def test_only_complete_lines_are_taken(pipe):
     descriptor, writer = pipe
     lines = Lines(descriptor)
     assert lines.take() == []
@@ -88,7 +88,7 @@ def test_a_last_line_without_an_end_counts_when_the_other_side_closes(pipe):
     assert lines.is_ended
 
 
-def test_a_line_without_end_fills_no_memory(pipe):
+def test_an_endless_line_is_truncated(pipe):
     descriptor, writer = pipe
     lines = Lines(descriptor)
     for _ in range(100):
@@ -98,7 +98,7 @@ def test_a_line_without_end_fills_no_memory(pipe):
     assert len(lines.take()[0]) < 1000
 
 
-def test_stdin_presses_and_names_what_it_does_not_know(pipe):
+def test_stdin_presses_buttons_and_names_unknown_lines(pipe):
     descriptor, writer = pipe
     pendant = Pendant(None, Lines(descriptor), 0)
     writer.write(b"Activate\nfly\n idle \n")
@@ -108,7 +108,7 @@ def test_stdin_presses_and_names_what_it_does_not_know(pipe):
     assert pendant.take_unknown() == []
 
 
-def test_a_script_presses_at_its_times():
+def test_a_script_presses_buttons_at_its_times():
     script = parse_script("1 activate\n2 quit")
     pendant = Pendant(script, Lines(None), 10 * S)
     assert pendant.due(11 * S - 1) == []
@@ -126,7 +126,7 @@ def test_the_end_of_a_terminal_quits_unless_there_is_a_script(script, pressed):
     os.close(terminal)
 
 
-def test_the_end_of_a_pipe_quits_nothing(pipe):
+def test_the_end_of_a_pipe_does_not_quit(pipe):
     descriptor, writer = pipe
     writer.write(b"idle\n")
     writer.close()
@@ -134,7 +134,7 @@ def test_the_end_of_a_pipe_quits_nothing(pipe):
     assert [pendant.due(0), pendant.due(1), pendant.due(2)] == [["idle"], [], []]
 
 
-def test_a_terminal_that_another_program_has_is_not_read(monkeypatch):
+def test_a_terminal_of_another_process_group_is_not_read(monkeypatch):
     master, terminal = os.openpty()
     os.write(master, b"quit\n")
     monkeypatch.setattr(os, "tcgetpgrp", lambda _: os.getpgrp() + 1)
@@ -149,7 +149,7 @@ def test_a_terminal_that_another_program_has_is_not_read(monkeypatch):
 @pytest.mark.parametrize(
     ("content", "why"), [(b"\xff\xfe", "not text"), (b"#" * 1_000_001, "1 MB")]
 )
-def test_a_script_that_is_no_small_text_is_refused(tmp_path, content, why):
+def test_a_script_that_is_too_large_or_not_text_is_refused(tmp_path, content, why):
     path = tmp_path / "presses.txt"
     path.write_bytes(content)
     with pytest.raises(SettingsError, match=why):

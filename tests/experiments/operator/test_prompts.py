@@ -36,11 +36,11 @@ def asked(prompt, *, attempt=1, is_complete=False, since=0.0):
         (asked(Prompt.REVIEW, attempt=AUTO_ATTEMPTS), "q"),
     ],
 )
-def test_the_automatic_operator_presses_the_obvious_key(question, key):
+def test_the_automatic_operator_presses_the_expected_key(question, key):
     assert AutoOperator().answer(question) == key
 
 
-def test_the_hand_does_each_thing_once_per_prompt():
+def test_the_simulated_hand_acts_once_per_prompt():
     done = []
 
     class Recorder:
@@ -90,6 +90,6 @@ def test_a_fault_is_planned_as_written(text, plan):
 
 
 @pytest.mark.parametrize("text", ["", "estop@", "estop@T+1s", "estop@T1-1s", "flood"])
-def test_a_fault_that_is_not_of_the_form_is_refused(text):
+def test_a_malformed_fault_is_refused(text):
     with pytest.raises(SettingsError, match="is not a fault that can be raised"):
         parse_fault(text, KNOWN)

@@ -57,7 +57,7 @@ def ready(**changed):
     return ReadyView(**(values | changed))
 
 
-def test_a_running_trial_shows_time_way_cadence_and_newest_forces():
+def test_a_running_trial_shows_time_travel_rate_and_newest_forces():
     top, F_n, F_t, v_t, keys, stop = recording_lines(recording(), 80)
     assert top == (
         "● REC T04  07.4 s  0.21 of 0.45 m  500.0 Hz  missed 0  CAN ok  F/T ok"
@@ -121,14 +121,14 @@ def test_a_number_that_rounds_to_zero_has_no_sign(value):
     assert SCALE.number(-0.06) == "-0.1 N"
 
 
-def test_the_scale_is_fixed_and_shows_a_tenth_of_the_limit():
+def test_the_scale_of_a_sparkline_is_fixed_and_shows_small_values():
     assert sparkline(np.array([0.0, 1.0, 6.4, 16.0, 36.0, 64.0, 640.0]), 7, SCALE) == (
         "▁▂▃▅▆██"
     )
     assert sparkline(np.full(7, 1.0), 7, SCALE) == "▂" * 7
 
 
-def test_the_last_bar_is_the_newest_value_and_no_peak_before_it():
+def test_the_last_bar_is_the_newest_value_not_an_earlier_peak():
     values = np.concatenate((np.full(2499, 64.0), [0.0]))
     assert sparkline(values, 10, SCALE) == "█" * 9 + "▁"
 
@@ -139,7 +139,7 @@ def test_a_short_slip_shows_in_a_long_line():
     assert sparkline(values, 10, SCALE).count("█") == 1
 
 
-def test_what_is_no_number_leaves_its_bar_empty():
+def test_nan_leaves_its_bar_empty():
     assert sparkline(np.array([64.0, np.nan, 64.0]), 3, SCALE) == "█ █"
 
 
@@ -148,7 +148,7 @@ def test_a_sparkline_has_its_width_whatever_the_numbers(values, width):
     assert len(sparkline(values, width, SCALE)) == width
 
 
-def test_the_ready_screen_tells_where_the_session_stands():
+def test_the_ready_screen_shows_progress_times_and_reset():
     top, clock, reset, thin = ready_lines(ready())
     assert top == ("ARM: floating  S012 S10 · trial 4 of 10 · kept 3 · rejected 1")
     assert clock == "Elapsed 12:40 · left about 30 min"
@@ -156,7 +156,7 @@ def test_the_ready_screen_tells_where_the_session_stands():
     assert thin == "Thin so far: slower than 0.05 m/s, above 5 N"
 
 
-def test_before_the_first_trial_nothing_is_guessed():
+def test_no_remaining_time_is_shown_without_an_estimate():
     _, clock = ready_lines(ready(left=None, reset=(), thin=""))
     assert clock == "Elapsed 12:40"
 
@@ -171,7 +171,7 @@ def test_a_ticked_step_has_a_full_box():
     assert line.endswith("1 ☐ rake  2 ☑ level")
 
 
-def test_a_verdict_is_shown_while_it_can_be_taken_back():
+def test_a_verdict_is_shown_while_it_can_be_undone():
     given_ = ready_lines(ready(given="T03 kept", undo_left=6.2))[-1]
     assert given_ == "T03 kept.  [u]ndo (7 s)"
     later = ready_lines(ready(given="T03 kept", undo_left=0.0))
@@ -211,14 +211,14 @@ def test_a_panel_breaks_between_keys_and_keeps_first_and_last_lines():
 
 @pytest.mark.parametrize("prompt", [Prompt.READY, Prompt.REVIEW, Prompt.RECORDING])
 @pytest.mark.parametrize("width", [40, 60, 80])
-def test_no_key_is_broken(prompt, width):
+def test_no_key_is_broken_across_lines(prompt, width):
     parts = [part.strip() for part in screen_keys(prompt).split("  ")]
     shown = packed(screen_keys(prompt), width).split("\n")
     assert max(map(len, shown)) <= width
     assert all(any(part in line for line in shown) for part in parts)
 
 
-def test_a_trace_stands_above_the_median_of_the_kept_ones():
+def test_a_trace_is_shown_above_the_median_of_the_kept_ones():
     own = TravelTrace("F_t", "N", np.array([0.0, 7.0, np.nan, 14.0]))
     kept = [np.array([7.0, 7.0, 7.0, np.nan]), np.array([7.0, 0.0, 7.0, np.nan])]
     words, mine, theirs = trace_lines(own, [*kept, np.zeros(9)], "T03", 80)

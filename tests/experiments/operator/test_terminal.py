@@ -14,7 +14,7 @@ from experiments.operator.terminal import LONGEST_LINE, Cbreak, TerminalInput, k
 
 @pytest.fixture
 def terminal():
-    """Return (the person's end, the program's end) of a pseudo-terminal."""
+    """(the person's end, the program's end) of a pseudo-terminal."""
     person, program = pty.openpty()
     yield person, program
     for descriptor in (person, program):
@@ -33,7 +33,7 @@ def keys_of(terminal):
     return person, keys
 
 
-def test_keys_from_a_terminal_are_those_of_the_person_who_is_logged_in(terminal):
+def test_the_operator_at_a_terminal_is_the_user_who_is_logged_in(terminal):
     name = pwd.getpwuid(os.getuid()).pw_name
     assert TerminalInput(terminal[1]).who == name
     assert AutoOperator().who == "auto"
@@ -54,7 +54,7 @@ def test_a_key_counts_without_enter_and_is_not_echoed(terminal):
 
 
 @pytest.mark.parametrize("how", ["return", "raise", "twice"])
-def test_the_terminal_is_given_back_as_it_was(terminal, how):
+def test_the_terminal_settings_are_restored(terminal, how):
     _, program = terminal
     before = termios.tcgetattr(program)
     with contextlib.suppress(RuntimeError), Cbreak(program) as switched:
@@ -66,7 +66,7 @@ def test_the_terminal_is_given_back_as_it_was(terminal, how):
     assert termios.tcgetattr(program) == before
 
 
-def test_a_terminal_that_has_gone_is_left_alone():
+def test_a_closed_terminal_is_left_alone():
     person, program = pty.openpty()
     os.close(person)
     os.close(program)
@@ -87,8 +87,8 @@ class Pressed:
         self.now_ms = 0
         self.keys = TerminalInput(program, lambda: self.now_ms * MS)
 
-    def come(self, key, now_ms, prompt):
-        """Let `key` come; return what is answered at `prompt`."""
+    def press(self, key, now_ms, prompt):
+        """Let `key` arrive; the answer at `prompt`."""
         self.now_ms = now_ms
         self.keys.answer(asked(prompt))  # which is on the screen before
         os.write(self.person, key)
@@ -100,26 +100,26 @@ class Pressed:
 def test_a_key_that_is_held_answers_one_prompt(terminal, first_ms, every_ms):
     pressed = Pressed(terminal)
     with Cbreak(pressed.keys.descriptor):
-        assert pressed.come(b" ", 0, Prompt.SUPPORT) == " "
+        assert pressed.press(b" ", 0, Prompt.SUPPORT) == " "
         times = range(first_ms, 5000, every_ms)
         prompts = (Prompt.READY, Prompt.RECORDING, Prompt.REVIEW, Prompt.SUPPORT)
         for number, now_ms in enumerate(times):
-            assert pressed.come(b" ", now_ms, prompts[number % 4]) == ""
+            assert pressed.press(b" ", now_ms, prompts[number % 4]) == ""
         # Released, and pressed again.
-        assert pressed.come(b" ", times[-1] + 750, Prompt.READY) == " "
+        assert pressed.press(b" ", times[-1] + 750, Prompt.READY) == " "
 
 
-def test_a_pedal_that_sticks_answers_nothing_between_the_keys_of_a_person(terminal):
+def test_a_stuck_pedal_answers_nothing_between_other_keys(terminal):
     pressed = Pressed(terminal)
     with Cbreak(pressed.keys.descriptor):
-        assert pressed.come(b" ", 0, Prompt.REVIEW) == " "
+        assert pressed.press(b" ", 0, Prompt.REVIEW) == " "
         for now_ms in range(33, 3000, 33):
-            assert pressed.come(b" ", now_ms, Prompt.REVIEW) == ""
+            assert pressed.press(b" ", now_ms, Prompt.REVIEW) == ""
             if now_ms % 990 == 0:  # another key counts at once
-                assert pressed.come(b"k", now_ms + 1, Prompt.REVIEW) == "k"
+                assert pressed.press(b"k", now_ms + 1, Prompt.REVIEW) == "k"
 
 
-def test_letters_of_a_note_may_come_twice(terminal):
+def test_letters_of_a_note_may_repeat(terminal):
     pressed = Pressed(terminal)
     with Cbreak(pressed.keys.descriptor):
         pressed.keys.line(asked(Prompt.NOTE))
@@ -128,7 +128,7 @@ def test_letters_of_a_note_may_come_twice(terminal):
 
 
 @pytest.mark.parametrize("prompt", [Prompt.MOVE, Prompt.LAY_DOWN])
-def test_motion_of_the_arm_takes_a_key_that_no_prompt_before_it_takes(prompt):
+def test_motion_of_the_arm_has_a_key_that_no_other_prompt_has(prompt):
     (key,) = [e.key for e in KEYS[prompt] if e.action is KeyAction.CONFIRM]
     others = set(KEYS) - {prompt}
     assert all(key != entry.key for other in others for entry in KEYS[other])
@@ -143,7 +143,7 @@ def test_motion_of_the_arm_takes_a_key_that_no_prompt_before_it_takes(prompt):
         (b"r2", ["r2"]),
         (b"r9k", ["k"]),
         (b"rr1", ["r1"]),  # the second only repeats the first
-        (b"rk1", ["1"]),  # any other key takes the r back
+        (b"rk1", ["1"]),  # any other key cancels the r
         (b"   ", [" "]),
         (b"\x1b[A", ["[", "a"]),
         (b"kq", ["k", "q"]),
@@ -154,8 +154,8 @@ def test_keys_become_answers_one_at_a_time(terminal, typed, answers):
     person, keys = keys_of(terminal)
     with Cbreak(keys.descriptor):
         os.write(person, typed)
-        found = [keys.answer(asked()) for _ in range(4)]
-    assert [answer for answer in found if answer] == answers
+        received = [keys.answer(asked()) for _ in range(4)]
+    assert [answer for answer in received if answer] == answers
 
 
 def test_the_digit_of_a_reason_may_come_later(terminal):
@@ -175,20 +175,20 @@ def test_r_is_a_plain_key_outside_the_review(terminal):
         assert keys.answer(asked(Prompt.READY)) == "r"
 
 
-def test_what_was_typed_before_a_prompt_is_not_meant_for_it(terminal):
+def test_keys_typed_before_a_prompt_do_not_answer_the_prompt(terminal):
     person, keys = keys_of(terminal)
     with Cbreak(keys.descriptor):
         os.write(person, b"kkk")
         assert keys.answer(asked(Prompt.READY)) == ""
 
 
-def test_a_keyboard_that_is_unplugged_quits(terminal):
+def test_an_unplugged_keyboard_quits(terminal):
     person, keys = keys_of(terminal)
     os.close(person)
     assert keys.answer(asked()) == "q"
 
 
-def test_only_keys_of_a_terminal_switch_it_over(terminal):
+def test_only_terminal_input_changes_the_terminal_settings(terminal):
     _, program = terminal
     before = termios.tcgetattr(program)
     with keyboard(AutoOperator()):
@@ -211,7 +211,7 @@ def test_only_keys_of_a_terminal_switch_it_over(terminal):
         (b"x" * (LONGEST_LINE + 9) + b"\n", "x" * LONGEST_LINE),
     ],
 )
-def test_a_line_ends_with_enter_and_is_given_up_with_escape(terminal, typed, line):
+def test_a_line_ends_with_enter_and_is_abandoned_with_escape(terminal, typed, line):
     person, keys = keys_of(terminal)
     with Cbreak(keys.descriptor):
         assert keys.line(asked(Prompt.NOTE)) is None
@@ -230,14 +230,14 @@ def test_a_line_grows_while_it_is_typed(terminal):
             assert keys.draft == draft
 
 
-def test_a_line_is_given_up_when_the_keyboard_is_unplugged(terminal):
+def test_a_line_is_abandoned_when_the_keyboard_is_unplugged(terminal):
     person, keys = keys_of(terminal)
     keys.line(asked(Prompt.NOTE))
     os.close(person)
     assert keys.line(asked(Prompt.NOTE)) == ""
 
 
-def test_what_was_typed_of_a_line_is_no_key_afterwards(terminal):
+def test_keys_typed_after_a_line_do_not_answer_the_next_prompt(terminal):
     person, keys = keys_of(terminal)
     with Cbreak(keys.descriptor):
         keys.line(asked(Prompt.NOTE))
