@@ -1,4 +1,4 @@
-"""An arm that is held still in poses: what C5 to C7 record of it, without the loop.
+"""Recordings of C5 to C7 and C14 of an arm held still in poses, without the loop.
 
 Zeros, mount, foot, cable and axes are those of a departure; the readings are those of
 the simulated sensor with all its errors, in the order and time of the steps.
@@ -25,12 +25,12 @@ from wam.model.constants import GRAVITY, Array, load_constants
 from wam.model.tool import Tool
 
 _STEP = 0.02  # s, between two readings
-_MISSED = 0.03  # rad, standard deviation of a pose that a person brings an arm to
-_SLOP = np.radians(0.1)  # of a joint pressed onto its stop by hand
+_POSE_SPREAD = 0.03  # rad, standard deviation of a pose set by hand
+_STOP_SPREAD = np.radians(0.1)  # rad, of a joint pressed onto its stop by hand
 
 
 class HeldArm:
-    """An arm that differs from its drawings, in the hands of a person."""
+    """An arm that deviates from its drawings, in the hands of a person."""
 
     def __init__(
         self, tool: Tool, seed: int, wrong: str = "", another_day: int = 0
@@ -38,11 +38,11 @@ class HeldArm:
         """Draw the sound arm of `seed`.
 
         Args:
-            tool: what hangs on its plate, as believed.
-            seed: of what is drawn once for an arm.
-            wrong: a name of the catalogue; "" = nothing is.
-            another_day: draws anew what is another one every day: poses, the sensor's
-                bias, drift and noise.
+            tool: tool on the plate, as the settings state.
+            seed: seed of the properties drawn once for an arm.
+            wrong: name in the catalogue of wrong rigs; "" for a sound arm.
+            another_day: seed of what differs every day: poses, the sensor's bias,
+                drift and noise.
         """
         sound = draw_sound_rig(seed)
         self.departure: RigDeviation = (
@@ -69,15 +69,15 @@ class HeldArm:
         self._hung = 0.0
         self._pushed: Array = np.zeros(3)  # N, at the sole, base frame
 
-    def told(self, q: Array) -> Array:
-        """Return where the joints are told to be that are truly at `q` [rad], (7,)."""
+    def reported(self, q: Array) -> Array:
+        """Reported positions [rad], shape (7,), of joints that are truly at `q`."""
         home, ratios = self._constants.home, self._constants.j2mp
         turned = self.departure.counts @ (ratios @ (q - home))
         there = np.linalg.solve(self._believed.j2mp, turned)
         return there + self._believed.home + self.departure.zeros
 
     def stops(self) -> Values:
-        """Return what C5 records."""
+        """Recording of C5."""
         lows: list[Array] = []
         highs: list[Array] = []
         for joint in range(7):
@@ -86,20 +86,20 @@ class HeldArm:
                 (highs, self._constants.q_upper),
             ):
                 q = np.array(POSES[0])
-                q[joint] = bound[joint] + _SLOP * self._random.standard_normal()
-                ends.append(self.told(q))
+                q[joint] = bound[joint] + _STOP_SPREAD * self._random.standard_normal()
+                ends.append(self.reported(q))
         drawn = constants_around_home(self._believed)
         ends = {"q_lower": drawn.q_lower, "q_upper": drawn.q_upper}
         return {"low": np.array(lows), "high": np.array(highs), **ends}
 
     def own_weight(self, poses: Sequence[Sequence[float]] = POSES) -> Values:
-        """Return what C6 records, or the daily check in fewer poses."""
+        """Recording of C6, or of the daily check in fewer poses."""
         measured = [self._bring(pose) for pose in poses]
         q, readings = zip(*measured, strict=True)
-        return {"q": np.array(q), "readings": np.array(readings), **self._believes()}
+        return {"q": np.array(q), "readings": np.array(readings), **self._stated_tool()}
 
     def hung_weight(self, stops: Array) -> Values:
-        """Return what C7 records after stops that were off by `stops` [rad], (7,)."""
+        """Recording of C7 after stops with errors `stops` [rad], shape (7,)."""
         parts: list[tuple[Array, ...]] = []
         for at in HUNG_AT:
             q, before = self._bring(POSES[at])
@@ -113,10 +113,10 @@ class HeldArm:
             name: np.array(part) for name, part in zip(names, columns, strict=True)
         }
         hung = {"hung": np.array(HUNG), "stops": stops}
-        return {**arrays, **self._believes(), **hung}
+        return {**arrays, **self._stated_tool(), **hung}
 
     def plate(self, pressed: float = PRESSED * GRAVITY) -> Values:
-        """Return what C14 records where the scale truly bears `pressed` [N]."""
+        """Recording of C14 where the scale truly supports `pressed` [N]."""
         parts = [self._bring(POSES[0])]
         for force in ((0.0, 0.0, pressed), (0.0, PULLED, 0.0)):
             self._pushed = np.array(force)
@@ -126,9 +126,9 @@ class HeldArm:
         shown = {"pressed": np.array(PRESSED * GRAVITY), "pulled": np.array(PULLED)}
         q, readings = zip(*parts, strict=True)
         arrays = {"q": np.array(q), "readings": np.array(readings)}
-        return {**arrays, **self._believes(), **shown}
+        return {**arrays, **self._stated_tool(), **shown}
 
-    def _believes(self) -> dict[str, Array]:
+    def _stated_tool(self) -> dict[str, Array]:
         payload = payload_of(self._tool)
         sole = self._tool.sole - np.array([0.0, 0.0, self._tool.sensor_height])
         return {
@@ -141,11 +141,11 @@ class HeldArm:
 
     def _bring(self, pose: Sequence[float]) -> tuple[Array, Array]:
         before = self._q
-        after = np.array(pose) + _MISSED * self._random.standard_normal(7)
+        after = np.array(pose) + _POSE_SPREAD * self._random.standard_normal(7)
         for share in np.linspace(0.0, 1.0, round(CARRY_SECONDS / _STEP)):
             self._q = before + share * (after - before)
             self._read()
-        return self.told(self._q), self._measure()
+        return self.reported(self._q), self._measure()
 
     def _measure(self) -> Array:
         for _ in range(round(SETTLED / _STEP)):

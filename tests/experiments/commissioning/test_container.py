@@ -1,4 +1,4 @@
-"""C13: a container as its row says passes, what was typed wrong is named."""
+"""C13: a container that agrees with its row passes; a wrong entry is named."""
 
 from dataclasses import asdict, replace
 
@@ -14,18 +14,18 @@ HALF_WIDTH = 0.12  # m
 
 @pytest.fixture(scope="module")
 def frame():
-    """Return the frame of a container that is inclined."""
+    """The frame of an inclined container."""
     rows = load_settings(None).matrix.terrains
     return terrain_frame(next(row for row in rows if row.name == "S10"))
 
 
 def touched(true, typed, noise=0.0):
-    """Return what C13 records where the corners of `true` are touched."""
+    """Recording of C13 where the corners of `true` are touched."""
     along, across, _ = true.axes()
     far = np.array(true.far_end)
     corners = [
-        far + along * way + across * side
-        for way in (0.0, true.travel)
+        far + along * distance + across * side
+        for distance in (0.0, true.travel)
         for side in (HALF_WIDTH, -HALF_WIDTH)
     ]
     points = np.array(corners) + np.random.default_rng(1).normal(0.0, noise, (4, 3))
@@ -46,13 +46,13 @@ def test_a_container_as_typed_passes(frame):
         ({"travel": -0.1}, "travel is longer than the container"),
     ],
 )
-def test_what_was_typed_wrong_is_named(frame, changes, words):
+def test_a_wrong_entry_is_named(frame, changes, words):
     was = {name: np.add(getattr(frame, name), by) for name, by in changes.items()}
     true = replace(frame, **was)
     assert words in container.judge(touched(true, frame)).cause
 
 
-def test_a_heading_is_compared_over_the_turn(frame):
+def test_headings_are_compared_across_half_a_turn(frame):
     true = replace(frame, heading=np.pi - 0.01)
     typed = replace(frame, heading=-np.pi + 0.01, far_end=true.far_end)
     assert container.judge(touched(true, typed)).cause == ""

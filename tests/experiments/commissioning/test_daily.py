@@ -1,4 +1,4 @@
-"""The check of every day: what it makes of an arm that is, and is not, as it was."""
+"""The daily check passes an unchanged arm and names what has changed."""
 
 from datetime import UTC, datetime, timedelta
 
@@ -35,13 +35,13 @@ def tool():
 
 
 def lain(seconds=1.0):
-    """Return what an arm records that lies still."""
+    """Recording of an arm that lies still."""
     t_ns = np.arange(round(seconds / 0.002)) * 2_000_000
     return {"t_ns": t_ns, "q": np.tile(HOME, (len(t_ns), 1)), "ended": texts([])}
 
 
 def lifted(torques):
-    """Return what is recorded while joints 2 and 4 are lifted off at these [N m]."""
+    """Recording while joints 2 and 4 are lifted off at `torques` [N m]."""
     parts = []
     for joint, sense, torque in ((2, 1.0, torques[0]), (4, -1.0, torques[1])):
         part = lain()
@@ -62,9 +62,9 @@ def lifted(torques):
 
 
 def day(tool, seed, wrong="", torques=BEFORE, **changed):
-    """Return what is recorded on another day of the arm of `seed`."""
+    """Recording of another day of the arm of `seed`."""
     weight = fit_foot(HeldArm(tool, seed).own_weight()).weight
-    poses = [POSES[at] for at in daily.HANGING] * 2  # held again where it did not fit
+    poses = [POSES[at] for at in daily.HANGING] * 2  # repeated where a pose did not fit
     held = HeldArm(tool, seed, wrong, another_day=1).own_weight(poses)
     values = {
         "heard_master": np.array(-1),
@@ -79,14 +79,14 @@ def day(tool, seed, wrong="", torques=BEFORE, **changed):
         **held,
         "reference_weight": weight,
         "reference_lifted": np.array(BEFORE),
-        **{f"rest_{name}": each for name, each in lain().items()},
-        **{f"ramp_{name}": each for name, each in lifted(torques).items()},
+        **{f"rest_{name}": array for name, array in lain().items()},
+        **{f"ramp_{name}": array for name, array in lifted(torques).items()},
     }
     return values | changed
 
 
 @pytest.mark.slow
-def test_no_sound_arm_of_many_is_stopped_on_another_day(tool):
+def test_many_sound_arms_pass_on_another_day(tool):
     causes = [daily.judge(day(tool, seed)).cause for seed in range(SOUND)]
     assert causes == [""] * SOUND
 
@@ -103,14 +103,14 @@ def test_no_sound_arm_of_many_is_stopped_on_another_day(tool):
 @pytest.mark.parametrize(
     "seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))]
 )
-def test_an_arm_that_changed_is_named(tool, seed, wrong, words):
+def test_a_change_of_the_arm_is_named(tool, seed, wrong, words):
     assert daily.judge(day(tool, seed, wrong)).cause.startswith(words)
 
 
 @pytest.mark.parametrize(
     ("torques", "joint"), [((15.2, 7.0), 2), ((22.0, 7.0), 2), ((18.0, 5.5), 4)]
 )
-def test_a_lift_off_that_drifted_is_named(tool, torques, joint):
+def test_a_changed_lift_off_torque_is_named(tool, torques, joint):
     cause = daily.judge(day(tool, 1, torques=torques)).cause
     assert cause.startswith(f"lift-off of joint {joint} over that of the commissioning")
 
@@ -132,7 +132,7 @@ def test_a_joint_that_is_lifted_by_less_than_its_weight_is_named(tool):
         ({"zero": np.radians([0.0, 1.8, 0, 0, 0, 0, 0])}, "zeroed elsewhere"),
     ],
 )
-def test_a_bus_or_a_zero_that_is_another_one_is_named(tool, changed, words):
+def test_a_fault_of_the_bus_or_a_changed_zero_is_named(tool, changed, words):
     assert words in daily.judge(day(tool, 1, **changed)).cause
 
 
@@ -143,7 +143,7 @@ def test_an_arm_that_moves_without_torque_is_named_and_not_lifted(tool):
     assert daily.judge(values).cause.startswith("way of joint 2 without torque")
 
 
-def test_an_arm_that_was_not_commissioned_has_nothing_to_be_compared_with(tmp_path):
+def test_a_daily_check_before_the_commissioning_is_refused(tmp_path):
     files = RecordFolder.open(tmp_path, is_simulated=True)
     with pytest.raises(SettingsError, match="C6 own weight was not passed"):
         daily.reference_of(files)
@@ -168,7 +168,7 @@ def check(days, lifted_at=1.0, cause=""):
     )
 
 
-def test_a_history_is_read_as_it_was_written_and_counts_for_a_day(tmp_path):
+def test_a_history_is_read_as_written_and_valid_for_a_limited_time(tmp_path):
     history = DailyHistory().with_check(check(0)).with_check(check(1))
     write_history(tmp_path, history)
     assert read_history(tmp_path, is_simulated=False) == history

@@ -1,4 +1,4 @@
-"""May torque be sent? The record beside rig.toml and the arm that answers tell."""
+"""Torque is sent only to an arm whose commissioning record is sound and current."""
 
 import json
 from datetime import UTC, datetime, timedelta
@@ -27,7 +27,7 @@ FRICTION = ("compensation = 0.7", "compensation = 0.6")  # of rig.toml
 
 
 class Arm:
-    """An arm in stepped time that is asked as a real one is."""
+    """An arm in stepped time that is checked like a real one."""
 
     def __init__(self, config, wrong=""):
         settings = load_settings(config)
@@ -56,7 +56,7 @@ class Arm:
 
 @pytest.fixture
 def config(tmp_path):
-    """Return a rig.toml with a record of the arm that it names."""
+    """A rig.toml with a sound record of its arm."""
     path = write_config(tmp_path)
     arm = Arm(path)
     write_commissioning(tmp_path, sound_record(arm.rig, arm.info))
@@ -79,12 +79,12 @@ def test_an_arm_without_a_record_is_refused(config):
         (*FRICTION, "C10 lift: stale: [friction]"),
     ],
 )
-def test_a_record_that_settings_made_stale_is_refused(config, old, new, words):
+def test_a_record_made_stale_by_settings_is_refused(config, old, new, words):
     config.write_text(changed(config.read_text(), old, new))
     assert words in Arm(config).refusal().message
 
 
-def test_an_arm_of_another_puck_with_the_same_files_is_refused(config):
+def test_an_arm_with_a_replaced_puck_is_refused(config):
     refusal = Arm(config, "one-puck-replaced").refusal()
     assert "C2 identity: stale: serial number" in refusal.message
 
@@ -97,7 +97,7 @@ def test_an_edited_record_is_refused(config):
     assert "was changed at or before C8 rest pose" in Arm(config).refusal().message
 
 
-def test_a_record_of_a_simulated_arm_is_none_of_a_real_one(config):
+def test_a_record_of_a_simulated_arm_does_not_count_for_a_real_one(config):
     arm = Arm(config)
     record = sound_record(arm.rig, arm.info)
     simulated = record.model_copy(update={"is_simulated": True})
@@ -105,11 +105,11 @@ def test_a_record_of_a_simulated_arm_is_none_of_a_real_one(config):
     assert "C0 configuration: not done" in arm.refusal().message
 
 
-def test_a_sound_record_lets_through_and_recordings_say_what_is_open(config):
+def test_a_sound_record_passes_and_recordings_name_the_open_steps(config):
     arm = Arm(config)
-    said = arm.check()["commissioning"]
+    status = arm.check()["commissioning"]
     assert [mark for mark, *_ in arm.lines] == [GOOD, WARNING]
-    assert said.startswith("uncommissioned: C12 lock and clock: not done")
+    assert status.startswith("uncommissioned: C12 lock and clock: not done")
 
 
 def test_a_record_of_every_step_is_complete(config):
@@ -122,17 +122,17 @@ def test_a_record_of_every_step_is_complete(config):
         changes = {"step": step, "subject": subject, "inputs": inputs}
         record = record.with_step(record.steps[0].model_copy(update=changes))
     write_commissioning(config.parent, record)
-    said = {"commissioning": "complete", "daily_check": "commissioned today"}
-    assert arm.check() == said
+    status = {"commissioning": "complete", "daily_check": "commissioned today"}
+    assert arm.check() == status
 
 
-def test_what_a_command_measures_anew_is_not_stale_for_it(config):
+def test_a_section_that_a_command_measures_anew_is_not_stale_for_it(config):
     config.write_text(changed(config.read_text(), *FRICTION))
     assert Arm(config).check(("[friction]",))
 
 
-def as_of(config, hours):
-    """Let the record be of so long ago, and nothing stale by that."""
+def date_record(config, hours):
+    """Date a sound record `hours` back."""
     arm = Arm(config)
     record = sound_record(arm.rig, arm.info)
     for done in record.steps:
@@ -143,7 +143,7 @@ def as_of(config, hours):
 
 
 def checked(config, hours, cause="", *, is_simulated=False):
-    """Write a daily check of so long ago."""
+    """Write a daily check of `hours` ago."""
     arm = Arm(config)
     now = datetime.fromtimestamp(arm.rig.clock.utc_ns() // 10**9, UTC)
     arm.rig.backend.close()
@@ -160,77 +160,75 @@ def checked(config, hours, cause="", *, is_simulated=False):
     write_history(config.parent, history.with_check(done))
 
 
-def said_of_today(config):
+def daily_status(config):
     arm = Arm(config)
-    said = arm.check()["daily_check"]
+    status = arm.check()["daily_check"]
     (line,) = [line for line in arm.lines if line[1] == "daily check"]
-    return line[0], said
+    return line[0], status
 
 
-def test_a_day_without_a_check_is_said_in_recordings(config):
-    as_of(config, 30)
-    assert said_of_today(config) == (WARNING, "none today")
+def test_a_day_without_a_check_is_noted_in_recordings(config):
+    date_record(config, 30)
+    assert daily_status(config) == (WARNING, "none today")
     checked(config, 17)
-    mark, said = said_of_today(config)
-    assert (mark, said[:27]) == (WARNING, "none today, the last one 20")
+    mark, status = daily_status(config)
+    assert (mark, status[:27]) == (WARNING, "none today, the last one 20")
 
 
-def test_a_check_of_today_is_said_in_recordings(config):
-    as_of(config, 30)
+def test_a_check_of_today_is_noted_in_recordings(config):
+    date_record(config, 30)
     checked(config, 15)
-    mark, said = said_of_today(config)
-    assert (mark, said[-5:]) == (GOOD, "sound")
+    mark, status = daily_status(config)
+    assert (mark, status[-5:]) == (GOOD, "sound")
 
 
 def test_an_arm_whose_check_failed_is_refused_until_one_passes(config):
-    as_of(config, 30)
+    date_record(config, 30)
     checked(config, 20, "lift-off of joint 2 over that of the commissioning 0.2.")
     refusal = Arm(config).refusal()
     assert "The daily check of this arm failed: " in refusal.message
     assert "lift-off of joint 2" in refusal.message
     checked(config, 1)
-    assert said_of_today(config)[0] == GOOD
+    assert daily_status(config)[0] == GOOD
 
 
 @pytest.mark.parametrize("hours", [-0.2, -24, -90000])
-def test_a_check_whose_date_has_not_come_is_refused_until_another_is_done(
-    config, hours
-):
-    """It would count until its date has come, for years after a wrong clock."""
-    as_of(config, 30)
+def test_a_check_dated_in_the_future_is_refused_until_a_new_one(config, hours):
+    """After a wrong clock such a check would be valid for years."""
+    date_record(config, 30)
     checked(config, hours)
     refusal = Arm(config).refusal()
     assert "which has not come yet: this computer's clock says 20" in refusal.message
     assert "timedatectl" in refusal.hint
     assert "traction commission --daily" in refusal.hint
     checked(config, 0)
-    assert said_of_today(config)[0] == GOOD
+    assert daily_status(config)[0] == GOOD
 
 
-def test_a_clock_that_was_set_back_by_minutes_costs_no_check(config):
-    as_of(config, 30)
+def test_a_check_stays_valid_if_the_clock_is_set_back_by_minutes(config):
+    date_record(config, 30)
     checked(config, -0.05)
-    assert said_of_today(config)[0] == GOOD
+    assert daily_status(config)[0] == GOOD
 
 
 @pytest.mark.parametrize("hours", [-0.2, -23, -24 * 400])
-def test_a_commissioning_whose_date_has_not_come_is_refused(config, hours):
-    as_of(config, hours)
+def test_a_commissioning_dated_in_the_future_is_refused(config, hours):
+    date_record(config, hours)
     assert "which has not come yet" in Arm(config).refusal().message
 
 
-def test_what_failed_before_the_arm_was_commissioned_again_does_not_count(config):
-    as_of(config, 2)
+def test_a_failed_check_before_a_new_commissioning_does_not_count(config):
+    date_record(config, 2)
     checked(config, 3, "lift-off of joint 2.")
-    assert said_of_today(config) == (GOOD, "commissioned today")
+    assert daily_status(config) == (GOOD, "commissioned today")
 
 
-def test_checks_of_a_simulated_arm_say_nothing_of_a_real_one(config):
-    as_of(config, 30)
+def test_checks_of_a_simulated_arm_do_not_count_for_a_real_one(config):
+    date_record(config, 30)
     checked(config, 1, "lift-off of joint 2.", is_simulated=True)
-    assert said_of_today(config) == (WARNING, "none today")
+    assert daily_status(config) == (WARNING, "none today")
 
 
-def test_a_history_that_is_none_is_refused(config):
+def test_an_invalid_history_is_refused(config):
     (config.parent / "daily.json").write_text("[]")
     assert "daily.json cannot be read" in Arm(config).refusal().message

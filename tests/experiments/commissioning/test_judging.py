@@ -54,7 +54,7 @@ def turned(joint=0, off=0.0, scale=1.0):
     return {"low": low, "high": high, **ends}
 
 
-def test_joints_that_stop_where_they_should_pass():
+def test_joints_that_stop_at_their_limits_pass():
     assert by_hand.judge(turned()).cause == ""
 
 
@@ -66,11 +66,11 @@ def test_joints_that_stop_where_they_should_pass():
         (turned(3, scale=0.5), "travel of joint 4"),
     ],
 )
-def test_an_encoder_that_is_wrong_is_named(values, words):
+def test_a_wrong_encoder_is_named(values, words):
     assert words in by_hand.judge(values).cause
 
 
-def test_a_joint_that_goes_along_is_named():
+def test_a_joint_that_moves_along_is_named():
     values = turned()
     values["high"][4, 5] = 1.0
     assert "Turned was joint 5, joint 6 went along" in by_hand.judge(values).cause
@@ -91,17 +91,17 @@ def pressed(*, silent_after=0):
     }
 
 
-def test_a_sound_stop_passes_and_one_that_leaves_the_power_does_not():
+def test_a_sound_stop_passes_and_one_that_leaves_the_power_on_fails():
     assert stop_circuit.judge(pressed()).cause == ""
     assert "stop button" in stop_circuit.judge(pressed(silent_after=200)).cause
 
 
-def test_a_module_that_does_not_go_to_idle_is_named_by_the_time_that_passes():
+def test_a_module_that_does_not_return_to_idle_in_time_is_named():
     sound = pressed()
     mode, t_ns = sound["mode"].copy(), sound["t_ns"].copy()
     mode[20] = SafetyMode.ACTIVE
     assert stop_circuit.judge({**sound, "mode": mode}).cause == ""
-    # Nothing is recorded while it is asked to; its own heartbeat brakes it at last.
+    # Nothing is recorded while the module is asked; its heartbeat brakes it at last.
     t_ns[21:] += 98_000_000
     late = {**sound, "mode": mode, "t_ns": t_ns}
     late |= {name: sound[name] + 98_000_000 for name in ("released_ns", "idled_ns")}
@@ -110,14 +110,14 @@ def test_a_module_that_does_not_go_to_idle_is_named_by_the_time_that_passes():
     assert "does not go back" in stop_circuit.judge({**sound, "mode": mode}).cause
 
 
-def test_a_module_that_its_heartbeat_brakes_is_named_though_no_cycle_saw_it_active():
+def test_a_module_braked_by_its_heartbeat_only_is_named():
     sound = pressed()
     for pause_ns, is_named in ((4_000_000, False), (104_000_000, True)):
         t_ns = sound["t_ns"].copy()
         t_ns[21:] += pause_ns
         times = {name: sound[name] + pause_ns for name in ("released_ns", "idled_ns")}
         seen = {**sound, **times, "t_ns": t_ns}
-        seen |= {"early_ns": t_ns[21] + 4_000_000}  # it is told of it then
+        seen |= {"early_ns": t_ns[21] + 4_000_000}  # the module reports it then
         cause = stop_circuit.judge(seen).cause
         assert ("does not go back to idle" in cause) is is_named, cause
     # A pause at another time says nothing of the module.
@@ -125,7 +125,7 @@ def test_a_module_that_its_heartbeat_brakes_is_named_though_no_cycle_saw_it_acti
     assert stop_circuit.judge(far).cause == ""
 
 
-def test_a_number_that_no_sound_rig_has_is_named():
+def test_an_unusual_setting_is_named():
     values = {
         "unusual": texts(["rig.toml: loop.test_time = 0.5"]),
         "load": np.array(1.0),
@@ -146,7 +146,7 @@ def test_an_arm_that_moves_without_torque_is_named():
 @pytest.mark.parametrize(
     ("braked_ms", "is_sound"), [(100, True), (148, True), (152, False), (None, False)]
 )
-def test_a_module_brakes_an_arm_that_nobody_asks(braked_ms, is_sound):
+def test_a_module_must_brake_an_arm_without_requests_in_time(braked_ms, is_sound):
     t_ns = np.arange(500) * 2_000_000
     mode = np.full(500, int(SafetyMode.ACTIVE))
     fresh = np.where(np.arange(500) < 10, 0x7F, 0)  # the last one at 18 ms
@@ -176,16 +176,16 @@ def test_a_module_brakes_an_arm_that_nobody_asks(braked_ms, is_sound):
         (Fault.PROOF_MOTION, (), False),
     ],
 )
-def test_only_the_heartbeat_proves_the_heartbeat(fault, causes, is_heartbeat):
+def test_only_a_heartbeat_fault_counts_as_the_heartbeat(fault, causes, is_heartbeat):
     verdict = verdict_for(fault, CircuitCauses(causes))
     assert rest_pose.is_heartbeat(verdict) is is_heartbeat
 
 
 def lifted(share):
-    """Return what is recorded of joint 2 that weighs `share` of what is predicted."""
-    way = np.concatenate([np.linspace(0.0, 0.08, 400), np.linspace(0.08, 0.0, 400)])
+    """Recording of joint 2 with `share` of its predicted weight."""
+    lift = np.concatenate([np.linspace(0.0, 0.08, 400), np.linspace(0.08, 0.0, 400)])
     q, tau, predicted = np.tile(CONSTANTS.home, (800, 1)), *np.zeros((2, 800, 7))
-    q[:, 1] += way
+    q[:, 1] += lift
     predicted[:, 1] = 18.7
     tau[:, 1] = 18.7 * share + np.where(np.arange(800) < 400, 1.0, -1.0)  # friction
     return {
@@ -203,7 +203,7 @@ def lifted(share):
     ("share", "is_sound"),
     [(1.0, True), (0.9, True), (1.1, True), (0.88, False), (1.17, False)],
 )
-def test_a_joint_weighs_what_is_predicted_to_two_newton_metres(share, is_sound):
+def test_the_weight_on_a_joint_must_agree_with_the_prediction(share, is_sound):
     cause = rest_pose.judge_lift(lifted(share)).cause
     assert (cause == "") is is_sound
     assert is_sound or cause.startswith("weight on joint 2")
@@ -211,8 +211,8 @@ def test_a_joint_weighs_what_is_predicted_to_two_newton_metres(share, is_sound):
 
 def test_a_recording_is_read_as_written_or_refused(tmp_path):
     raw = write_raw(tmp_path, "one.npz", {"q": np.arange(3.0), "t": texts(["a"])})
-    found = read_raw(tmp_path, raw)
-    assert found["q"].tolist() == [0.0, 1.0, 2.0]
+    arrays = read_raw(tmp_path, raw)
+    assert arrays["q"].tolist() == [0.0, 1.0, 2.0]
     (tmp_path / "one.npz").write_bytes(b"other")
     with pytest.raises(SettingsError, match="not what was recorded"):
         read_raw(tmp_path, raw)

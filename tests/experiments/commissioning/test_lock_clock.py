@@ -1,4 +1,4 @@
-"""C12: lag, stiffness and ringing are recovered from signals of known ones."""
+"""C12: lag, stiffness and ringing are recovered from synthetic signals."""
 
 import numpy as np
 import pytest
@@ -15,16 +15,16 @@ MODEL = ArmModel(load_constants(), TOOL)
 UP = np.array([0.0, 0.0, 1.0])
 
 
-def rocked(lag=0.0, way=0.3, seconds=10.0):
-    """Return what is recorded of a foot that is rocked about joint 6 at 1 Hz."""
+def rocked(lag=0.0, amplitude=0.3, seconds=10.0):
+    """Recording of a foot that is rocked about joint 6 at 1 Hz."""
     gauges, t = WristGauges(TOOL, UP, 0.002), np.arange(0.0, seconds, 0.002)
     q = np.tile(np.array(POSES[1], dtype=np.float64), (len(t), 1))
-    q[:, 5] += way * np.sin(2.0 * np.pi * t)
+    q[:, 5] += amplitude * np.sin(2.0 * np.pi * t)
     qd = np.gradient(q, 0.002, axis=0)
     loads = []
-    for place, speed in zip(q, qd, strict=True):
-        rates = MODEL.sole_jacobian(place) @ speed
-        gauges.end_cycle(MODEL.plate_pose(place)[1], [0.0] * 6, rates.tolist())
+    for position, speed in zip(q, qd, strict=True):
+        rates = MODEL.sole_jacobian(position) @ speed
+        gauges.end_cycle(MODEL.plate_pose(position)[1], [0.0] * 6, rates.tolist())
         loads.append(gauges.load())
     t_ns = np.round(1e9 * (t + 1.0)).astype(np.int64)
     rng = np.random.default_rng(1)
@@ -37,13 +37,13 @@ def rocked(lag=0.0, way=0.3, seconds=10.0):
 
 
 def turned(stiffness=20.0, moment=0.6, back=0.0):
-    """Return what is recorded of a foot that is turned and let go."""
-    way = moment / stiffness
+    """Recording of a foot that is turned and released."""
+    amplitude = moment / stiffness
     rest = np.zeros(900)
-    swing = way * np.exp(-np.arange(100) / 20.0)
-    swing[50] = -back * way
+    swing = amplitude * np.exp(-np.arange(100) / 20.0)
+    swing[50] = -back * amplitude
     return {
-        "turned": np.array([0.1, 0.1 + way, 0.1]),
+        "turned": np.array([0.1, 0.1 + amplitude, 0.1]),
         "moments": np.array([[0, 0, 0.02], [0, 0, 0.02 + moment], [0, 0, 0.02]]),
         "swing_q7": np.concatenate([swing, rest]) + 0.1,
         "ended": texts([]),
@@ -68,15 +68,15 @@ def test_a_sound_arm_passes():
 
 
 @pytest.mark.parametrize("lag", [-0.006, 0.006, 0.02])
-def test_forces_of_another_time_are_named(lag):
+def test_a_lag_of_the_forces_is_named(lag):
     assert cause(**rocked(lag)).startswith("forces behind positions")
 
 
-def test_a_foot_that_was_hardly_rocked_tells_nothing():
-    assert cause(**rocked(way=0.05)).startswith("swing of the foot's weight")
+def test_a_foot_that_was_hardly_rocked_is_named():
+    assert cause(**rocked(amplitude=0.05)).startswith("swing of the foot's weight")
 
 
-def test_a_recording_without_readings_is_no_sound_one():
+def test_a_recording_without_sensor_readings_fails():
     nothing = {"wrench_ns": np.zeros(0), "wrench": np.zeros((0, 6))}
     assert cause(**nothing).startswith("swing of the foot's weight")
 
@@ -91,10 +91,10 @@ def test_a_lock_that_rings_is_named():
     assert cause(**turned(back=0.3)) == ""
 
 
-def test_a_moment_of_nothing_tells_nothing():
+def test_too_small_a_moment_is_named():
     assert cause(**turned(moment=0.1)).startswith("moment that turned the foot")
 
 
-def test_an_arm_that_the_guard_stopped_is_named_by_its_words():
+def test_the_message_of_a_guard_stop_is_the_cause():
     stopped = {"ended": texts(["The speed of joint 7 was 2.6 rad/s."])}
     assert "The speed of joint 7" in cause(**stopped)

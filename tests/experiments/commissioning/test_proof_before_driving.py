@@ -1,4 +1,4 @@
-"""A step that drives a real arm in the open asks for those that prove it can be."""
+"""A step that drives a real arm requires the earlier steps of the commissioning."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ from lab.guest.commissioned import sound_record
 
 @pytest.fixture
 def scene():
-    """Return the scene of a rig that has no simulated hands, as a real one."""
+    """The scene of a rig without simulated hands, like a real one."""
     settings = load_settings(None)
     row = settings.matrix.terrains[0]
     rig = replace(connect_rig(settings, row, FakeOptions("fast", 1)), simulation=None)
@@ -31,14 +31,14 @@ def scene():
     rig.backend.close()
 
 
-def test_an_arm_without_its_proofs_is_not_driven(scene, tmp_path):
+def test_an_arm_without_the_earlier_steps_is_not_driven(scene, tmp_path):
     files = RecordFolder.open(tmp_path, is_simulated=False)
     with pytest.raises(PreflightError, match="C0 configuration: not done"):
         do_step(scene, STEPS[StepId.CONTAINER], files, ("Ada", "Grace"))
     assert not files.record.steps
 
 
-def test_a_stale_proof_is_named(scene, tmp_path):
+def test_a_stale_earlier_step_is_named(scene, tmp_path):
     scene.start()
     record = sound_record(scene.rig, scene.info)
     lift = record.of(StepId.LIFT)

@@ -1,4 +1,4 @@
-"""The record of a commissioning: what stands in it is what was done."""
+"""The record of a commissioning reveals edits, and steps that are missing or stale."""
 
 import json
 from datetime import UTC, datetime, timedelta
@@ -41,25 +41,25 @@ def whole(*steps):
     return record
 
 
-def test_what_is_written_is_read(tmp_path):
+def test_a_record_is_read_as_written(tmp_path):
     record = whole()
     write_commissioning(tmp_path, record)
     assert read_commissioning(tmp_path) == record
 
 
-def test_a_folder_without_the_file_has_none(tmp_path):
+def test_a_folder_without_the_file_has_no_record(tmp_path):
     assert read_commissioning(tmp_path) is None
 
 
-def test_a_step_that_is_done_again_takes_its_place():
+def test_a_repeated_step_replaces_the_earlier_one():
     again = whole().with_step(done(StepId.TIMING, cause="a slow adapter"))
-    assert [one.step for one in again.steps] == list(ORDER)
+    assert [entry.step for entry in again.steps] == list(ORDER)
     assert again.of(StepId.TIMING).cause == "a slow adapter"
     assert again.first_broken() is None
 
 
 @pytest.mark.parametrize("step", ORDER)
-def test_a_number_that_was_changed_is_noticed_at_its_step(tmp_path, step):
+def test_a_changed_number_is_noticed_at_its_step(tmp_path, step):
     write_commissioning(tmp_path, whole())
     path = tmp_path / NAME
     content = json.loads(path.read_text())
@@ -69,7 +69,7 @@ def test_a_number_that_was_changed_is_noticed_at_its_step(tmp_path, step):
         read_commissioning(tmp_path)
 
 
-def test_a_step_that_was_taken_out_is_noticed_at_the_next(tmp_path):
+def test_a_removed_step_is_noticed_at_the_next(tmp_path):
     write_commissioning(tmp_path, whole())
     path = tmp_path / NAME
     content = json.loads(path.read_text())
@@ -80,18 +80,18 @@ def test_a_step_that_was_taken_out_is_noticed_at_the_next(tmp_path):
 
 
 HOSTILE = {
-    "nothing": "",
-    "no object": "[]",
+    "empty file": "",
+    "not an object": "[]",
     "another version": '{"version": 1, "program": "x"}',
     "an unknown key": '{"program": "x", "steps": [], "torque": 1}',
     "a text for a number": '{"program": 1}',
-    "no end": '{"program": "x", "steps": [' + "[" * 5000,
+    "unterminated": '{"program": "x", "steps": [' + "[" * 5000,
     "a million wrong steps": '{"program": "x", "steps": [' + "1," * 999_999 + "1]}",
 }
 
 
 @pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE)
-def test_what_is_no_such_file_is_refused_in_one_sentence(tmp_path, text):
+def test_an_invalid_file_is_refused_with_a_short_message(tmp_path, text):
     (tmp_path / NAME).write_text(text)
     with pytest.raises(SettingsError, match="cannot be read") as refused:
         read_commissioning(tmp_path)
@@ -110,7 +110,7 @@ def test_a_link_is_not_followed(tmp_path):
 @pytest.mark.parametrize(
     "order", [(StepId.TIMING, StepId.LISTEN), (StepId.LISTEN,) * 2]
 )
-def test_steps_stand_in_order_and_once(order):
+def test_steps_out_of_order_or_repeated_are_refused(order):
     steps = tuple(done(step) for step in order)
     with pytest.raises(ValueError, match="not in order"):
         Commissioning(program="x", steps=steps)
@@ -119,44 +119,44 @@ def test_steps_stand_in_order_and_once(order):
 # --- the gate -----------------------------------------------------------------------
 
 
-def test_a_whole_record_lacks_nothing():
+def test_a_complete_record_lacks_no_step():
     assert lacks(whole(), INPUTS, NOON) == []
     require([])
 
 
 def test_without_a_record_every_step_is_missing_and_the_first_is_named():
-    found = lacks(None, INPUTS, NOON)
-    assert [lack.step for lack in found] == list(ORDER)
+    lacking = lacks(None, INPUTS, NOON)
+    assert [lack.step for lack in lacking] == list(ORDER)
     with pytest.raises(PreflightError, match="C0 configuration: not done, and 11 more"):
-        require(found)
+        require(lacking)
 
 
 @pytest.mark.parametrize("name", BASES)
-def test_what_changed_makes_its_steps_stale_and_no_others(name):
-    found = lacks(whole(), {**INPUTS, name: "f" * 64}, NOON)
-    assert tuple(lack.step for lack in found) == BASES[name].steps
-    assert all(f"stale: {BASES[name].words} changed" in lack.text for lack in found)
+def test_a_changed_input_makes_its_steps_stale_and_no_others(name):
+    lacking = lacks(whole(), {**INPUTS, name: "f" * 64}, NOON)
+    assert tuple(lack.step for lack in lacking) == BASES[name].steps
+    assert all(f"stale: {BASES[name].words} changed" in lack.text for lack in lacking)
 
 
-def test_what_is_not_known_now_contradicts_nothing():
-    known = {name: digest for name, digest in INPUTS.items() if name != "module"}
-    assert lacks(whole(), known, NOON) == []
+def test_an_unknown_input_makes_no_step_stale():
+    present = {name: digest for name, digest in INPUTS.items() if name != "module"}
+    assert lacks(whole(), present, NOON) == []
 
 
 @pytest.mark.parametrize("name", TOLD)
-def test_what_a_person_says_makes_its_steps_stale_until_they_are_done_again(name):
+def test_a_reported_change_makes_its_steps_stale_until_they_are_repeated(name):
     record = whole().with_reported_change(name, NOON + timedelta(hours=1))
-    found = lacks(record, INPUTS, NOON + timedelta(hours=2))
-    assert tuple(lack.step for lack in found) == BASES[name].steps
-    assert "changed on 2026-11-26, as told" in found[0].text
-    known = {**INPUTS, **record.reported_inputs()}
+    lacking = lacks(record, INPUTS, NOON + timedelta(hours=2))
+    assert tuple(lack.step for lack in lacking) == BASES[name].steps
+    assert "changed on 2026-11-26, as told" in lacking[0].text
+    present = {**INPUTS, **record.reported_inputs()}
     for step in BASES[name].steps:
-        inputs = {each: known[each] for each in bases_of(step)}
+        inputs = {basis: present[basis] for basis in bases_of(step)}
         record = record.with_step(done(step, inputs=inputs))
     assert lacks(record, INPUTS, NOON) == []
 
 
-def test_what_a_person_said_is_not_taken_out_unseen(tmp_path):
+def test_a_removed_report_of_a_change_is_noticed(tmp_path):
     record = whole().with_reported_change("cables", NOON + timedelta(hours=1))
     write_commissioning(tmp_path, record)
     assert read_commissioning(tmp_path) == record
@@ -168,16 +168,16 @@ def test_what_a_person_said_is_not_taken_out_unseen(tmp_path):
         read_commissioning(tmp_path)
 
 
-def test_after_a_month_all_is_stale():
+def test_all_steps_are_stale_after_a_limited_time():
     late = NOON + timedelta(days=30, minutes=6)
-    found = lacks(whole(), INPUTS, late)
-    assert [lack.step for lack in found] == list(ORDER)
+    lacking = lacks(whole(), INPUTS, late)
+    assert [lack.step for lack in lacking] == list(ORDER)
     assert lacks(whole(), INPUTS, late - timedelta(minutes=2)) == []
 
 
-def test_a_record_of_the_future_does_not_count():
-    found = lacks(whole(), INPUTS, NOON - timedelta(days=400))
-    assert [lack.step for lack in found] == list(ORDER)
+def test_a_record_dated_in_the_future_does_not_count():
+    lacking = lacks(whole(), INPUTS, NOON - timedelta(days=400))
+    assert [lack.step for lack in lacking] == list(ORDER)
 
 
 def test_a_step_that_failed_is_named_with_its_cause():
@@ -188,11 +188,11 @@ def test_a_step_that_failed_is_named_with_its_cause():
         require(lacks(record, INPUTS, NOON))
 
 
-def test_steps_beyond_the_gate_keep_nobody_from_driving():
+def test_steps_beyond_the_gate_do_not_prevent_driving():
     record = whole(*GATED)
-    found = lacks(record, INPUTS, NOON)
-    assert [str(lack.step) for lack in found] == ["C12", "C13", "C14"]
-    require(found)
+    lacking = lacks(record, INPUTS, NOON)
+    assert [str(lack.step) for lack in lacking] == ["C12", "C13", "C14"]
+    require(lacking)
 
 
 @pytest.mark.parametrize(
@@ -204,12 +204,12 @@ def test_steps_beyond_the_gate_keep_nobody_from_driving():
         (0.5, None, None, True, "travel 0.5 %"),
     ],
 )
-def test_a_quantity_stands_beside_its_limits(value, low, high, passes, text):
+def test_a_quantity_is_printed_with_its_limits(value, low, high, passes, text):
     quantity = Measured(name="travel", value=value, unit="%", low=low, high=high)
     assert (quantity.is_within, quantity.text) == (passes, text)
 
 
-# --- one of several -------------------------------------------------------------------
+# --- one container per terrain -------------------------------------------------------
 
 
 def test_every_terrain_keeps_its_own_container():
@@ -222,7 +222,7 @@ def test_every_terrain_keeps_its_own_container():
     )
     record = whole(*ORDER[:-2]).with_step(second).with_step(first)
     record = record.with_step(done(StepId.PLATE))
-    assert [one.subject for one in record.steps if one.subject] == ["S0", "S10"]
+    assert [entry.subject for entry in record.steps if entry.subject] == ["S0", "S10"]
     assert lacks(record, INPUTS, NOON, "S0") == []
     assert lacks(record, other, NOON, "S10") == []
     (stale,) = lacks(record, other, NOON, "S0")

@@ -1,7 +1,7 @@
-"""Every row of the table of staleness, changed where it truly stands.
+"""Every change of an input makes exactly the steps of its row stale.
 
-Settings are changed in rig.toml and matrix.toml, properties in what the pucks answer;
-the digests of both are those that commands make.
+Settings are changed in rig.toml and matrix.toml, properties in the replies of the
+pucks; the digests of both are those that commands make.
 """
 
 from dataclasses import replace
@@ -20,7 +20,7 @@ from lab.guest.commissioned import record_of
 from tests.experiments.commissioning.test_record import NOON
 from tests.experiments.program import changed, write_config
 
-SETTINGS = {  # name of the basis: file, what stands there, what stands there then
+SETTINGS = {  # name of the basis: file, old text, new text
     "[safety]": ("rig.toml", "speed_fault = 1.0", "speed_fault = 0.9"),
     "[limits]": ("rig.toml", "foot_speed = 0.8 ", "foot_speed = 0.7 "),
     "[arm]": ("rig.toml", "[arm]\n", "[arm]\nrest = [0, -2, 0, 3, 0, 0, 0]\n"),
@@ -38,7 +38,7 @@ MOTOR = ("IPNM", "POLES", "MT")
 
 
 def connected(folder):
-    """Return the rig of rig.toml, what it answers, its start, what its sensor says."""
+    """The rig of rig.toml, its replies, its start and the metadata of its sensor."""
     settings = load_settings(folder / "rig.toml")
     rig = connect_rig(
         settings, settings.matrix.terrains[0], FakeOptions("fast", 1, 0.7)
@@ -52,23 +52,23 @@ def connected(folder):
 
 
 def commissioned(present):
-    """Return a record of all steps that stand on what is `present`."""
+    """Record of all steps with the inputs `present`."""
     return record_of(ORDER, present, NOON)
 
 
 @pytest.fixture(scope="module")
 def sound(tmp_path_factory):
-    """Return a rig as it was commissioned."""
+    """A rig as it was commissioned."""
     folder = tmp_path_factory.mktemp("sound")
     write_config(folder)
     return connected(folder)
 
 
 def stale(sound, present):
-    """Return the steps that are stale now."""
-    found = lacks(commissioned(present_inputs(*sound)), present, NOON)
-    assert all(": stale: " in lack.text for lack in found)
-    return tuple(lack.step for lack in found)
+    """The steps that are stale with the inputs `present`."""
+    lacking = lacks(commissioned(present_inputs(*sound)), present, NOON)
+    assert all(": stale: " in lack.text for lack in lacking)
+    return tuple(lack.step for lack in lacking)
 
 
 def test_nothing_is_stale_where_nothing_changed(sound, tmp_path):
@@ -77,7 +77,7 @@ def test_nothing_is_stale_where_nothing_changed(sound, tmp_path):
 
 
 @pytest.mark.parametrize("name", SETTINGS)
-def test_a_section_that_was_changed(sound, tmp_path, name):
+def test_a_changed_section_makes_its_steps_stale(sound, tmp_path, name):
     write_config(tmp_path)
     file, old, new = SETTINGS[name]
     path = tmp_path / file
@@ -88,7 +88,7 @@ def test_a_section_that_was_changed(sound, tmp_path, name):
 
 @pytest.mark.parametrize("joint", [1, 7])
 @pytest.mark.parametrize("name", [*PUCK, *MOTOR])
-def test_a_puck_that_says_something_else(sound, joint, name):
+def test_a_changed_puck_property_makes_its_steps_stale(sound, joint, name):
     rig, answers, info, sensor = sound
     other = [dict(answer) for answer in answers]
     assert other[joint - 1][name] is not None
@@ -113,7 +113,7 @@ def test_a_puck_that_says_something_else(sound, joint, name):
     ],
     ids=["firmware", "serial", "VL1", "VL2", "TL1", "TL2"],
 )
-def test_another_module_or_one_with_other_limits_of_its_own(sound, change):
+def test_another_safety_module_or_other_limits_make_its_steps_stale(sound, change):
     rig, answers, info, sensor = sound
     assert info.safety_defaults == (2048, 4096, 4731, 5204)
     other = replace(info, **change(info))
@@ -121,40 +121,40 @@ def test_another_module_or_one_with_other_limits_of_its_own(sound, change):
     assert stale(sound, present) == BASES["module"].steps
 
 
-def test_a_module_that_does_not_tell_contradicts_nothing(sound):
+def test_a_module_without_a_serial_number_makes_no_step_stale(sound):
     rig, answers, info, sensor = sound
     silent = replace(info, safety_serial=None)
     assert stale(sound, present_inputs(rig, answers, silent, sensor)) == ()
 
 
-TOLD_BY_SENSOR = {"serial_number": "BFT-1", "firmware": "3.2"}  # once it has booted
+SENSOR_IDENTITY = {"serial_number": "BFT-1", "firmware": "3.2"}  # once it has booted
 
 
-@pytest.mark.parametrize("name", ["model", *TOLD_BY_SENSOR])
-def test_another_wrist_sensor(sound, name):
+@pytest.mark.parametrize("name", ["model", *SENSOR_IDENTITY])
+def test_another_wrist_sensor_makes_its_steps_stale(sound, name):
     rig, answers, info, sensor = sound
-    told = {**sensor, **TOLD_BY_SENSOR}
-    before = commissioned(present_inputs(rig, answers, info, told))
-    other = present_inputs(rig, answers, info, {**told, name: f"{told[name]}1"})
-    found = [lack.step for lack in lacks(before, other, NOON)]
-    assert tuple(found) == BASES["sensor"].steps
+    full = {**sensor, **SENSOR_IDENTITY}
+    before = commissioned(present_inputs(rig, answers, info, full))
+    other = present_inputs(rig, answers, info, {**full, name: f"{full[name]}1"})
+    lacking = [lack.step for lack in lacks(before, other, NOON)]
+    assert tuple(lacking) == BASES["sensor"].steps
 
 
-def test_a_sensor_that_does_not_tell_contradicts_nothing(sound):
+def test_a_sensor_of_unknown_identity_makes_no_step_stale(sound):
     rig, answers, info, sensor = sound
     assert sensor["serial_number"].startswith("unknown")
     silent = present_inputs(rig, answers, info, sensor)
-    told = present_inputs(rig, answers, info, {**sensor, **TOLD_BY_SENSOR})
-    assert lacks(commissioned(told), silent, NOON) == []
-    assert lacks(commissioned(silent), told, NOON) == []
+    full = present_inputs(rig, answers, info, {**sensor, **SENSOR_IDENTITY})
+    assert lacks(commissioned(full), silent, NOON) == []
+    assert lacks(commissioned(silent), full, NOON) == []
 
 
 def test_every_basis_is_changed_by_a_test():
-    # What only persons know stands in tests/experiments/commissioning/test_record.py.
+    # Changes reported by persons: tests/experiments/commissioning/test_record.py.
     assert {*SETTINGS, *TOLD, "pucks", "motors", "module", "sensor"} == set(BASES)
 
 
-def test_a_container_that_was_measured_again_under_the_same_name(sound):
+def test_a_container_measured_again_makes_its_steps_stale(sound):
     rig, answers, info, _ = sound
     row = rig.row.model_copy(update={"calibration": "terrain_S0.toml"})
 
@@ -165,5 +165,5 @@ def test_a_container_that_was_measured_again_under_the_same_name(sound):
 
     before = commissioned(present_inputs(measured("incline = 0.1"), answers, info))
     again = present_inputs(measured("incline = 0.2"), answers, info)
-    found = [lack.step for lack in lacks(before, again, NOON)]
-    assert tuple(found) == BASES["terrain"].steps
+    lacking = [lack.step for lack in lacks(before, again, NOON)]
+    assert tuple(lacking) == BASES["terrain"].steps

@@ -1,4 +1,4 @@
-"""A stop of a person within a step ends the sitting; the step is not judged by it."""
+"""A stop pressed during a step ends the commissioning run without a verdict."""
 
 import pytest
 
@@ -43,7 +43,7 @@ def press_in(scene: Scene, mode: SafetyMode, button: str, seconds: float) -> Non
 
 
 @pytest.mark.parametrize("button", ["estop", "idle"])
-def test_a_person_who_stops_the_held_arm_makes_no_step_wrong(scene, tmp_path, button):
+def test_a_stop_of_a_held_arm_gives_the_step_no_verdict(scene, tmp_path, button):
     files = RecordFolder.open(tmp_path, is_simulated=True)
     press_in(scene, SafetyMode.ACTIVE, button, 1.0)
     with pytest.raises(ArmFaultError):
@@ -51,7 +51,7 @@ def test_a_person_who_stops_the_held_arm_makes_no_step_wrong(scene, tmp_path, bu
     assert not files.record.steps
 
 
-def test_a_stop_while_the_arm_is_idle_is_told_at_once(scene, tmp_path):
+def test_a_stop_while_the_arm_is_idle_is_reported_at_once(scene, tmp_path):
     files = RecordFolder.open(tmp_path, is_simulated=True)
     start_ns = scene.rig.clock.now_ns()
     press_in(scene, SafetyMode.IDLE, "estop", 2.0)

@@ -8,7 +8,7 @@ from experiments.settings.load import load_settings
 from tests.experiments.commissioning.held_arm import HeldArm
 
 SOUND = 40
-WRONG = {  # name of the catalogue: words of the first cause, one of them
+WRONG = {  # wrong rig: possible words of the first cause
     "zero-2-off-10deg": ("joint 2 on its stop",),
     "wrist-9.48": ("travel of joint",),
     "encoder-4-reversed": ("sense of joint 4",),
@@ -30,7 +30,7 @@ def tool():
 
 
 def causes(tool, seed, wrong=""):
-    """Return what the three steps find, each "" or a cause, until the first."""
+    """Causes found by the three steps in turn, "" for a sound one."""
     arm = HeldArm(tool, seed, wrong)
     stops = arm.stops()
     yield by_hand.judge(stops).cause
@@ -45,7 +45,7 @@ def test_a_sound_arm_passes(tool, seed):
 
 
 @pytest.mark.slow
-def test_no_sound_arm_of_many_is_stopped(tool):
+def test_many_sound_arms_pass(tool):
     stopped = [seed for seed in range(SOUND) if any(causes(tool, seed))]
     assert stopped == []
 
