@@ -1,4 +1,4 @@
-"""A calibration is judged when it is loaded, as the command that made it judged it."""
+"""A calibration is checked at load by the criteria of the command that made it."""
 
 import dataclasses
 
@@ -34,16 +34,16 @@ GRAVITY = ('model = "cad"', 'model = "calibrated"')
 FRICTION = ('[friction]\nmodel = "none"', '[friction]\nmodel = "calibrated"')
 
 
-def weighed(folder, spoil, **changes):
+def weighed(folder, damage, **changes):
     settings = load_settings(write_config(folder, rig=GRAVITY))
     stored = gravity_from_toml(gravity(settings.rig, **changes), "gravity.toml")
-    text = gravity_to_toml(spoil(stored))
+    text = gravity_to_toml(damage(stored))
     build_law_model(settings.rig, text, "tread", is_simulated=True)
     return forced_calibrations(settings, LawCalibrations(gravity=text))
 
 
 def _heavier(stored):
-    """Return a calibration that fits its torques, of an arm that nobody builds."""
+    """A calibration that fits its torques, but of an implausible arm."""
     mus = stored.mus.copy()
     mus[1, 2] += 1.0
     change = np.array([_torques(mus - stored.mus, q) for q in stored.poses])
@@ -54,20 +54,20 @@ def _torques(mus, q):
     return gravity_torque(CONSTANTS, mus, q)
 
 
-SPOILED = {
-    "residual stated": (
+DAMAGES = {
+    "large residual": (
         lambda s: dataclasses.replace(s, residual=9.9),
         "leave 9.90 N m unexplained",
     ),
-    "rank stated": (
+    "low rank": (
         lambda s: dataclasses.replace(s, rank=3),
         "show 3 of 12 directions",
     ),
-    "torques": (
+    "wrong torques": (
         lambda s: dataclasses.replace(s, torques=s.torques + 2.0),
         "leave 2.00 N m unexplained",
     ),
-    "poses": (
+    "too few poses": (
         lambda s: dataclasses.replace(s, poses=s.poses[:1], torques=s.torques[:1]),
         "of 12 directions of gravity",
     ),
@@ -75,24 +75,24 @@ SPOILED = {
 }
 
 
-@pytest.mark.parametrize("name", SPOILED)
-def test_gravity_that_its_command_refuses_is_refused_at_load(tmp_path, name):
-    spoil, words = SPOILED[name]
+@pytest.mark.parametrize("name", DAMAGES)
+def test_gravity_refused_by_its_command_is_refused_at_load(tmp_path, name):
+    damage, words = DAMAGES[name]
     with pytest.raises(SettingsError, match="is no calibration to use") as refused:
-        weighed(tmp_path, spoil)
+        weighed(tmp_path, damage)
     assert words in refused.value.message
     assert "traction calibrate gravity again" in refused.value.hint
 
 
-def test_gravity_that_was_forced_is_warned_of(tmp_path):
-    def spoil(stored):
+def test_forced_gravity_gives_a_warning(tmp_path):
+    def damage(stored):
         return dataclasses.replace(stored, residual=0.7, is_forced=True)
 
-    (words,) = weighed(tmp_path, spoil)
+    (words,) = weighed(tmp_path, damage)
     assert words.startswith("gravity.toml was forced. The torques leave 0.70 N m")
 
 
-def test_sound_gravity_is_not_warned_of(tmp_path):
+def test_sound_gravity_gives_no_warning(tmp_path):
     assert weighed(tmp_path, lambda stored: stored) == []
 
 
@@ -104,7 +104,7 @@ def rubbed(folder, **changes):
     return build_compensation(settings.rig, text, is_simulated=True)
 
 
-def test_friction_that_its_command_refuses_is_refused_at_load(tmp_path):
+def test_friction_refused_by_its_command_is_refused_at_load(tmp_path):
     assert rubbed(tmp_path) is not None
     with pytest.raises(SettingsError, match=r"does not fit motor 3: .* 0\.25"):
         rubbed(tmp_path, residual=np.array([0, 0, 0.25, 0, 0, 0, 0]))
@@ -134,7 +134,7 @@ def sensed(folder, residual, **changes):
     return forced_calibrations(applied, LawCalibrations())
 
 
-def test_a_sensor_that_its_command_refuses_is_refused_at_load(tmp_path):
+def test_a_sensor_refused_by_its_command_is_refused_at_load(tmp_path):
     assert sensed(tmp_path, 0.29) == []
     with pytest.raises(SettingsError, match=r"forces leave 0\.31 N rms unexplained"):
         sensed(tmp_path, 0.31)
@@ -151,7 +151,7 @@ def touched(folder, incline_deg, **facts):
     return forced_calibrations(applied, LawCalibrations())
 
 
-def test_a_container_that_is_inclined_otherwise_is_refused_at_load(tmp_path):
+def test_a_container_with_another_incline_is_refused_at_load(tmp_path):
     assert touched(tmp_path, 10.9) == []
     with pytest.raises(SettingsError, match=r"inclined by 11\.1 degrees, the matrix"):
         touched(tmp_path, 11.1)
@@ -162,7 +162,7 @@ def test_a_container_that_is_inclined_otherwise_is_refused_at_load(tmp_path):
 ARM = (1201, 1202, 1203, 1204, 1205, 1206, 1207)
 
 
-def test_what_was_measured_on_another_arm_is_refused():
+def test_a_calibration_of_another_arm_is_refused():
     check_same_arm("gravity.toml", ARM, ARM)
     check_same_arm("gravity.toml", None, ARM)
     check_same_arm("gravity.toml", ARM, (None,) * 7)
@@ -172,7 +172,7 @@ def test_what_was_measured_on_another_arm_is_refused():
         check_same_arm("gravity.toml", ARM, range(7))
 
 
-def test_the_serial_numbers_of_the_arm_survive_a_file():
+def test_the_serial_numbers_of_the_arm_are_read_as_written():
     rig = load_settings(None).rig
     stored = gravity_from_toml(gravity(rig, arm=ARM), "gravity.toml")
     assert stored.arm == ARM
@@ -180,11 +180,11 @@ def test_the_serial_numbers_of_the_arm_survive_a_file():
     assert gravity_from_toml(gravity(rig), "gravity.toml").arm is None
 
 
-def test_serial_numbers_are_those_that_a_puck_can_say():
+def test_serial_numbers_must_be_values_of_a_puck_property():
     numbers = TypeAdapter(SerialNumbers)
     most = (2**31 - 1,) * 7
-    for said in (most, (0,) * 7):
-        assert numbers.validate_python(said) == said
+    for valid in (most, (0,) * 7):
+        assert numbers.validate_python(valid) == valid
     for wrong in (2**31, -1):
         with pytest.raises(ValidationError):
             numbers.validate_python((*most[:6], wrong))

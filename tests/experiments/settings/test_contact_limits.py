@@ -36,10 +36,10 @@ def test_default_limits_are_lowered_to_the_range_of_barretts_sensor(tmp_path):
     assert limits.contact_growth == 40.0
 
 
-def test_limits_within_the_range_stay_as_they_are_written(tmp_path):
+def test_limits_within_the_range_are_unchanged(tmp_path):
     change = ("contact_force = 100.0", "contact_force = 79.0")
     limits = guard(tmp_path, change)
-    # What ends a trial is not above what makes the arm hold.
+    # The limit that ends a trial is not above the limit of hold.
     assert (limits.contact_force, limits.contact_force_hold) == (79.0, 79.0)
 
 
@@ -62,7 +62,7 @@ def test_a_chosen_limit_beyond_the_range_is_refused(tmp_path, change, words):
     assert words in refused.value.message
 
 
-def test_ranges_that_rig_toml_states_count(tmp_path):
+def test_ranges_stated_in_rig_toml_are_used(tmp_path):
     lines = "[300.0, 300.0, 90.0, 15.0, 15.0, 9.0]"
     ranged = ('kind = "bota"', f'kind = "bota"\nranges = {lines}')
     limits = guard(tmp_path, kind=ranged)
@@ -70,13 +70,13 @@ def test_ranges_that_rig_toml_states_count(tmp_path):
     assert limits.contact_moment_hold == pytest.approx(8.1)
 
 
-def test_what_was_lowered_stands_on_the_page(tmp_path):
+def test_lowered_limits_are_shown_on_the_preflight_page(tmp_path):
     path = write_config(tmp_path)
     done = traction("check", "--fake", "--fast", "--config", path, "--data", tmp_path)
     assert "contact_moment_hold 10.8: 0.9 of the sensor's range" in done.out
 
 
-def test_a_sensor_that_has_to_be_asked_for_its_range_is_warned_of(tmp_path):
+def test_a_limit_beyond_the_range_read_from_a_sensor_gives_a_warning(tmp_path):
     robotous = ('kind = "bota"', 'kind = "robotous"\nrate = 1000')
     path = config(tmp_path, ("sinc = 64 ", "# sinc = 64 "), kind=robotous)
     path.write_text(path.read_text().replace("460800", "921600"))

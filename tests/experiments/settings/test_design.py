@@ -1,4 +1,4 @@
-"""matrix.toml: factors, cells and crosses."""
+"""Cells and crosses of matrix.toml give rows; a wrong entry is named with its cause."""
 
 import pytest
 
@@ -51,7 +51,7 @@ def load(tmp_path):
     return settings
 
 
-def test_a_cell_stands_where_its_place_is(load):
+def test_a_cell_takes_its_numbers_from_its_place(load):
     (row,) = load(FACTORS + CELL).matrix.terrains
     assert (row.far_end, row.travel, row.place) == ((0.7, 0.0, 0.12), 0.45, "bay")
     assert (row.stones, row.kind) == ("small", "small")
@@ -87,7 +87,7 @@ def test_a_name_may_hold_a_decimal_number(load):
     assert load(FACTORS + text).matrix.terrains[0].name == "G12.5dt-2"
 
 
-def test_words_multiply_what_is_simulated(load):
+def test_effects_of_words_are_passed_to_the_simulation(load):
     effects = "[simulate.moisture.wet]\ns_inf = 0.8\nk_w = 1.2\n"
     wet = CELL.replace("dry", "wet").replace("G19", "W19")
     dry, other = load(FACTORS + effects + CELL + wet).matrix.terrains
@@ -100,7 +100,7 @@ def changed(old, new, text=FACTORS + CELL):
 
 
 REFUSED = {
-    "no factor": (
+    "missing factor": (
         changed('moisture = "dry"\n', ""),
         'G19 does not state moisture; write moisture = "-"',
     ),
@@ -108,7 +108,7 @@ REFUSED = {
         changed('moisture = "dry"', 'moisture = "damp"'),
         "G19: moisture = 'damp' - expected one of dry, wet",
     ),
-    "no number": (changed("d50 = 19", 'd50 = "big"'), "expected a finite number"),
+    "not a number": (changed("d50 = 19", 'd50 = "big"'), "expected a finite number"),
     "not above 0": (changed("d50 = 19", "d50 = 0"), "expected a number above 0"),
     "misspelt key": (
         changed("moisture =", "moistur =", CELL).join([FACTORS, ""]),
@@ -126,7 +126,7 @@ REFUSED = {
         ),
         "factor d50 occurs twice",
     ),
-    "reserved": (changed('"moisture"', '"foot"'), "that Traction itself uses"),
+    "reserved name": (changed('"moisture"', '"foot"'), "that Traction itself uses"),
     "word without levels": (changed('levels = ["dry", "wet"]\n', ""), "needs levels"),
     "d50 in metres": (changed('unit = "mm"', 'unit = "m"'), "d50 is the grain size"),
     "no such place": (changed('"bay"', '"pit"'), "Teach it: traction teach pit"),
@@ -148,7 +148,7 @@ REFUSED = {
         changed('place = "bay"', 'place = "bay"\npush_deg = 90'),
         "cells[0].push_deg = 90",
     ),
-    "nothing": (FACTORS, "there are no [[cells]]"),
+    "no cells": (FACTORS, "there are no [[cells]]"),
     "no ground": (
         'version = "1.0"\n[[cells]]\nname = "A"\nfoot = "tread"\nplace = "bay"\n',
         'needs ground = "stones", "plate" or "fine"',
@@ -157,26 +157,26 @@ REFUSED = {
         FACTORS + CROSS.replace("[12, 37]", str(list(range(10, 60)))),
         "more than 400 cells",
     ),
-    "names alike": (
+    "equal names": (
         FACTORS + CROSS.replace("{incline_deg:+d}", ""),
         "name every factor of the cross",
     ),
-    "wide form": (FACTORS + CROSS.replace("02.0f", "9999f"), "odd form '9999f'"),
+    "wide format": (FACTORS + CROSS.replace("02.0f", "9999f"), "odd form '9999f'"),
     "attribute": (FACTORS + CROSS.replace("{foot:.1}", "{foot.real}"), "odd brace"),
     "long name": (
         FACTORS + CROSS.replace('"G{', '"' + 20 * "G" + "{"),
         "crosses[0].name",
     ),
     "empty list": (FACTORS + CROSS.replace("[12, 37]", "[]"), "d50 is an empty list"),
-    "effect of no word": (
+    "effect of an unknown word": (
         FACTORS + "[simulate.moisture.damp]\nk_w = 2\n" + CELL,
         "simulate.moisture.damp is no word of a factor",
     ),
-    "effect on nothing": (
+    "effect on an unknown quantity": (
         FACTORS + "[simulate.moisture.wet]\nhope = 2\n" + CELL,
         "simulate.moisture.wet.hope",
     ),
-    "block of nothing": (
+    "block by an unknown factor": (
         FACTORS + '[design]\norder = "blocked"\nblock_by = ["hope"]\n' + CELL,
         "block_by names 'hope'",
     ),
@@ -184,7 +184,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_is_wrong_is_refused_with_its_cause(load, name):
+def test_a_wrong_matrix_is_refused_with_its_cause(load, name):
     text, cause = REFUSED[name]
     with pytest.raises(SettingsError) as raised:
         load(text)
@@ -192,7 +192,7 @@ def test_what_is_wrong_is_refused_with_its_cause(load, name):
     assert raised.value.message.startswith("matrix.toml: ")
 
 
-def test_any_number_of_feet_and_the_errors_of_each(load):
+def test_further_feet_are_read_and_checked(load):
     foot = """
 [feet.round]
 mass = 0.4

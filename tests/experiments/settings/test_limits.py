@@ -15,7 +15,7 @@ def test_every_limit_of_the_guard_without_a_default_is_set_by_rig_toml():
     assert required - OF_THE_ARM == set(load_settings(None).rig.limits.of_guard())
 
 
-def test_limits_between_trials_are_not_the_guards():
+def test_only_the_limits_of_tare_and_disk_are_not_the_guards():
     others = set(LimitSection.model_fields) - {f.name for f in fields(GuardLimits)}
     assert others == {"tare_spread", "residual", "free_disk_gb"}
 

@@ -1,4 +1,4 @@
-"""A number that no rig has is refused, or at least warned of."""
+"""A number that no rig has is refused, or at least gives a warning."""
 
 import pytest
 from pydantic import BaseModel
@@ -14,39 +14,39 @@ FACTORS = {
     "a hundred times": 100.0,
     "in degrees, and in cm nearly": 57.2957795,
     "in g, mm, us": 1000.0,
-    "of the other sign": -1.0,
+    "with the opposite sign": -1.0,
     "infinite": float("inf"),
-    "no number": float("nan"),
+    "not a number": float("nan"),
 }
-# Numbers of which both signs are sound.
+# Numbers that may have either sign.
 _SIGNED = ("incline_deg", ".com[0]", ".sole[0]", "far_end", "start_q", "mech_at_home")
 
 
 def numbers(section: BaseModel, place: str = ""):
-    """Yield (dotted name, value) of every number."""
+    """(dotted name, value) of every number."""
     for name, field in type(section).model_fields.items():
         value = getattr(section, name)
         if isinstance(value, dict):
-            for key, each in value.items():
-                if isinstance(each, BaseModel):
-                    yield from numbers(each, f"{place}.{name}.{key}".lstrip("."))
+            for key, entry in value.items():
+                if isinstance(entry, BaseModel):
+                    yield from numbers(entry, f"{place}.{name}.{key}".lstrip("."))
             continue
-        for index, each in enumerate(value if isinstance(value, tuple) else (value,)):
+        for index, entry in enumerate(value if isinstance(value, tuple) else (value,)):
             item = index if isinstance(value, tuple) else None
             at = f"{place}.{name}".lstrip(".")
             at += "" if item is None else f"[{item}]"
-            if isinstance(each, BaseModel):
-                yield from numbers(each, at)
-            elif number_at(field, item) is not None and each is not None:
-                yield at, each
+            if isinstance(entry, BaseModel):
+                yield from numbers(entry, at)
+            elif number_at(field, item) is not None and entry is not None:
+                yield at, entry
 
 
 def with_number(section: BaseModel, name: str, value: float) -> BaseModel:
-    """Return the section with another number, validated like a file."""
+    """The section with another number, validated like a file."""
     data = section.model_dump()
-    *way, last = name.replace("[", ".").replace("]", "").split(".")
+    *keys, last = name.replace("[", ".").replace("]", "").split(".")
     table = data
-    for part in way:
+    for part in keys:
         key = int(part) if part.isdigit() else part
         if isinstance(table[key], tuple):
             table[key] = list(table[key])
@@ -65,7 +65,7 @@ def _as_tuples(value):
 
 @pytest.mark.parametrize("kind", FACTORS)
 @pytest.mark.parametrize("file", ["rig", "matrix"])
-def test_every_wrong_number_is_refused_or_warned_of(file, kind):
+def test_every_wrong_number_is_refused_or_gives_a_warning(file, kind):
     section, silent = getattr(SHIPPED, file), []
     for name, value in numbers(section):
         is_signed = FACTORS[kind] < 0.0 and any(part in name for part in _SIGNED)
@@ -85,7 +85,7 @@ def test_the_shipped_numbers_are_all_usual():
 
 
 def sections(model: type[BaseModel]):
-    """Yield a section and those in it."""
+    """A section and all sections in it."""
     yield model
     for field in model.model_fields.values():
         for kind in _models(field.annotation):
@@ -155,7 +155,7 @@ def test_a_refusal_names_number_range_unit_and_likely_mistake(
     assert words in refused.value.message
 
 
-def test_a_number_near_its_bound_is_warned_of_before_the_session(tmp_path):
+def test_a_number_near_its_bound_gives_a_warning_in_check(tmp_path):
     config = write_config(tmp_path, rig=("mass = 0.45 ", "mass = 1.9 "))
     words = "rig.toml: feet.tread.mass = 1.9, usual is 0.1 to 1.5 kg"
     for options in (("--config-only",), ("--fake", "--fast")):
@@ -164,7 +164,7 @@ def test_a_number_near_its_bound_is_warned_of_before_the_session(tmp_path):
         assert words in done.out
 
 
-def test_only_a_simulated_arm_may_be_as_late_as_a_busy_computer_is(tmp_path):
+def test_a_higher_limit_of_late_cycles_is_for_a_simulated_arm_only(tmp_path):
     change = ("late_per_second = 10", "late_per_second = 21")
     config = write_config(tmp_path, rig=change)
     real = traction("check", "--config", config, "--data", tmp_path)
