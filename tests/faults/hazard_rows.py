@@ -630,7 +630,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "the next command has the arm",
             (),
             "none",
-            (_LOCK + "test_a_killed_owner_gives_the_arm_back",),
+            (_LOCK + "test_a_killed_owner_releases_the_arm",),
         ),
         "stuck": (
             "a command that hangs keeps the arm",
@@ -639,7 +639,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "a person ends it",
             (),
             "the arm holds or is idle, as for a silent console",
-            (_LOCK + "test_a_second_process_is_refused_and_told_who_has_the_arm",),
+            (_LOCK + "test_a_second_process_is_refused_with_the_owner_of_the_arm",),
         ),
         "drifting": (
             "none: a lock has no value",
@@ -828,9 +828,9 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "nothing is started",
             (
-                "tests/experiments/rig/test_friction_compensation.py::test_friction_that_no_arm_has_is_refused_with_its_joint",
+                "tests/experiments/rig/test_friction_compensation.py::test_implausible_friction_is_refused_with_its_joint",
                 "tests/experiments/rig/test_friction_compensation.py::test_a_calibration_of_the_simulated_arm_is_refused_on_a_real_one",
-                "tests/experiments/rig/test_friction_compensation.py::test_one_made_with_another_gravity_is_refused",
+                "tests/experiments/rig/test_friction_compensation.py::test_a_calibration_with_another_gravity_is_refused",
             ),
         ),
         "late": (

@@ -1,4 +1,4 @@
-"""Two programs and one arm: who may open its bus, and what lies in the lock's place."""
+"""One program at a time may open an arm's bus, whatever is in place of the lock."""
 
 import os
 import signal
@@ -23,7 +23,7 @@ sys.stdin.readline()
 
 @pytest.fixture
 def shared(tmp_path):
-    """Return a folder that every user may write to, as /run/lock."""
+    """A folder that every user may write to, like /run/lock."""
     folder = tmp_path / "lock"
     folder.mkdir()
     folder.chmod(0o1777)
@@ -32,7 +32,7 @@ def shared(tmp_path):
 
 @pytest.fixture
 def holder(shared):
-    """Return another process that has the arm on can7."""
+    """Another process that holds the lock of the arm on can7."""
     process = subprocess.Popen(
         [sys.executable, "-c", HOLD, str(shared)],
         stdin=subprocess.PIPE,
@@ -49,7 +49,7 @@ def take(shared, channel="can7"):
     return ArmLock("socketcan", channel, [shared])
 
 
-def test_a_second_process_is_refused_and_told_who_has_the_arm(shared, holder):
+def test_a_second_process_is_refused_with_the_owner_of_the_arm(shared, holder):
     with pytest.raises(PreflightError) as refused:
         take(shared)
     assert refused.value.exit_code == 3
@@ -66,7 +66,7 @@ def test_another_channel_is_another_arm(shared, holder):
         take(shared)
 
 
-def test_a_killed_owner_gives_the_arm_back(shared, holder):
+def test_a_killed_owner_releases_the_arm(shared, holder):
     with pytest.raises(PreflightError):
         take(shared)
     holder.send_signal(signal.SIGKILL)
@@ -87,7 +87,7 @@ def test_a_child_of_the_owner_does_not_keep_the_arm(shared):
     child.communicate()
 
 
-def test_closing_gives_the_arm_back_and_can_be_repeated(shared):
+def test_closing_releases_the_arm_and_can_be_repeated(shared):
     lock = take(shared)
     with pytest.raises(PreflightError):
         take(shared)
@@ -106,9 +106,7 @@ def test_any_user_may_be_the_next_owner_whatever_the_umask(shared):
     lock.close()
 
 
-def test_a_file_of_another_user_that_can_only_be_read_is_locked_all_the_same(
-    shared, monkeypatch
-):
+def test_a_read_only_lock_file_of_another_user_is_locked_too(shared, monkeypatch):
     take(shared).close()
     usual = os.open
 
@@ -124,7 +122,7 @@ def test_a_file_of_another_user_that_can_only_be_read_is_locked_all_the_same(
     lock.close()
 
 
-def test_a_link_in_the_locks_place_is_not_followed(shared, tmp_path):
+def test_a_link_in_place_of_the_lock_is_not_followed(shared, tmp_path):
     victim = tmp_path / "precious"
     victim.write_text("precious")
     (shared / lock_name("socketcan", "can7")).symlink_to(victim)
@@ -133,7 +131,7 @@ def test_a_link_in_the_locks_place_is_not_followed(shared, tmp_path):
     assert victim.read_text() == "precious"
 
 
-def test_a_second_name_of_another_file_is_not_written_to(shared, tmp_path):
+def test_a_hard_link_in_place_of_the_lock_is_not_written_to(shared, tmp_path):
     victim = tmp_path / "precious"
     victim.write_text("precious")
     (shared / lock_name("socketcan", "can7")).hardlink_to(victim)
@@ -142,14 +140,14 @@ def test_a_second_name_of_another_file_is_not_written_to(shared, tmp_path):
     assert victim.read_text() == "precious"
 
 
-def test_a_pipe_in_the_locks_place_is_refused_without_waiting(shared):
+def test_a_pipe_in_place_of_the_lock_is_refused_without_waiting(shared):
     os.mkfifo(shared / lock_name("socketcan", "can7"))
     with pytest.raises(PreflightError, match="not a plain file"):
         take(shared)
 
 
 @pytest.mark.parametrize("words", [b"", b"\xff{", b"[1]", b'{"pid": 1', b"[" * 1024])
-def test_an_owner_that_wrote_nonsense_is_another_program(shared, words):
+def test_an_owner_with_an_unreadable_entry_is_called_another_program(shared, words):
     lock = take(shared)
     lock.path.write_bytes(words)
     with pytest.raises(PreflightError, match=r"process \? \(another program\)"):
@@ -167,7 +165,7 @@ def test_control_characters_of_an_owner_never_reach_the_terminal(shared):
     lock.close()
 
 
-def test_the_place_is_one_that_all_users_share(shared, tmp_path):
+def test_the_lock_folder_is_open_to_all_users(shared, tmp_path):
     private = tmp_path / "private"
     private.mkdir()
     assert lock_folder([tmp_path / "none", private, shared]) == shared
@@ -178,7 +176,7 @@ def test_the_place_is_one_that_all_users_share(shared, tmp_path):
 @pytest.mark.parametrize(
     "channel", ["/dev/ttyACM0", "../../etc/passwd", "a b\n", "x" * 300, "\0"]
 )
-def test_a_channel_never_leaves_the_folder(channel):
+def test_the_lock_of_any_channel_stays_in_the_folder(channel):
     name = lock_name("slcan", channel)
     assert name == os.path.basename(name)  # noqa: PTH119
     assert name.isprintable()

@@ -1,4 +1,4 @@
-"""What bounds the arm is what rig.toml and the arm's constants say, no more."""
+"""The limits of the arm follow from rig.toml and the arm's constants."""
 
 import numpy as np
 import pytest
@@ -29,12 +29,12 @@ def test_the_walls_brake_with_the_damping_of_the_arm_and_push_within_its_limits(
     assert np.array_equal(walls.upper, CONSTANTS.q_upper)
 
 
-def test_the_host_clips_where_the_pucks_do_or_below():
+def test_the_host_clips_torque_at_or_below_the_clamp_of_the_pucks():
     own = ArmSettings().torque_limits
     assert all(most <= clamp for most, clamp in zip(own, CONSTANTS.mt, strict=True))
 
 
-def test_the_host_leaves_the_motors_what_the_joints_may_have():
+def test_the_host_allows_the_motors_the_torque_of_every_joint_limit():
     """Half of the limits would be as wrong as twice: joint 2 alone takes most."""
     own = np.array(ArmSettings().torque_limits)
     units = (
@@ -43,9 +43,9 @@ def test_the_host_leaves_the_motors_what_the_joints_may_have():
     assert (np.abs(units).max(axis=0) <= own).all()
 
 
-def test_the_module_warns_at_nine_tenths_of_what_it_stops_for():
-    unsaid = {"speed_warning": None, "torque_warning_units": None}
-    safety = RIG.safety.model_copy(update=unsaid)
+def test_the_module_warns_at_a_share_of_its_fault_limits():
+    omitted = {"speed_warning": None, "torque_warning_units": None}
+    safety = RIG.safety.model_copy(update=omitted)
     limits = build_safety_limits(RIG.model_copy(update={"safety": safety}))
     assert limits.speed_warning == pytest.approx(0.9 * RIG.safety.speed_fault)
     assert limits.torque_warning_units == int(0.9 * RIG.safety.torque_fault_units)

@@ -1,4 +1,4 @@
-"""An arm is looked at before it is talked to, and left alone if it is another's."""
+"""The bus is listened to before anything is sent; an arm in use is left alone."""
 
 import pytest
 
@@ -15,12 +15,12 @@ from wam.bus.link import CanLink
 from wam.bus.transports import PythonCanTransport
 from wam.driver.arm import WamArm
 
-HOST_ASKS = 0x404  # positions of all pucks, asked by node 0
-PUCK_ANSWERS = 0x426  # node 1 to the host
+HOST_REQUEST = 0x404  # positions of all pucks, requested by node 0
+PUCK_REPLY = 0x426  # node 1 to the host
 
 
 class SharedBus(SteppedClock):
-    """A served bus with two clients; while the one listens, the other may talk."""
+    """A served bus with two clients; one may send while the other listens."""
 
     def __init__(self, folder):
         super().__init__()
@@ -50,15 +50,15 @@ def bus(tmp_path):
 
 
 def frames_of(link, bus):
-    """Return what `link` has put on the bus, as the other client sees it."""
+    """Identifiers that `link` has sent, as the other client sees them."""
     bus.hub.receive()
     seen = iter(lambda: bus.other.recv(0), None)
     return [frame.arbitration_id for frame in seen]
 
 
 @pytest.mark.parametrize("after_ms", [0, 25, 50])
-def test_a_frame_of_node_0_that_was_not_sent_from_here_is_another_master(bus, after_ms):
-    bus.talk = {bus.t_ns + after_ms * 1_000_000: HOST_ASKS}
+def test_a_foreign_frame_of_the_host_node_is_another_master(bus, after_ms):
+    bus.talk = {bus.t_ns + after_ms * 1_000_000: HOST_REQUEST}
     with pytest.raises(PreflightError) as refused:
         check_alone(bus.link, bus, "traction-fake:bus")
     assert "404" in refused.value.message
@@ -66,21 +66,21 @@ def test_a_frame_of_node_0_that_was_not_sent_from_here_is_another_master(bus, af
     assert frames_of(bus.link, bus) == []
 
 
-def test_all_that_was_heard_is_named_once(bus):
+def test_every_foreign_identifier_is_named_once(bus):
     bus.talk = {bus.t_ns: 0x404, bus.t_ns + 1: 0x401, bus.t_ns + 2: 0x404}
     with pytest.raises(PreflightError, match="identifiers 401 404"):
         check_alone(bus.link, bus, "traction-fake:bus")
 
 
-def test_a_quiet_bus_is_listened_to_for_50_ms_in_silence(bus):
+def test_a_quiet_bus_is_listened_to_without_sending(bus):
     start_ns = bus.t_ns
     check_alone(bus.link, bus, "traction-fake:bus")
     assert bus.t_ns - start_ns == LISTEN_NS == 50_000_000
     assert frames_of(bus.link, bus) == []
 
 
-def test_what_a_device_says_by_itself_is_no_master(bus):
-    bus.talk = {bus.t_ns: PUCK_ANSWERS}
+def test_a_reply_of_a_puck_is_no_other_master(bus):
+    bus.talk = {bus.t_ns: PUCK_REPLY}
     check_alone(bus.link, bus, "traction-fake:bus")
 
 
@@ -111,7 +111,7 @@ def test_a_silent_safety_module_is_left_to_the_start_up():
     check_inactive(WamArm(Silent(), SteppedClock()))
 
 
-def test_an_active_arm_is_refused_after_one_question():
+def test_an_active_arm_is_refused_after_one_request():
     rig = Rig(NetworkOptions(safety_mode=SafetyMode.ACTIVE))
     with pytest.raises(PreflightError, match="ACTIVE") as refused:
         check_inactive(WamArm(rig.link, rig.clock))

@@ -1,4 +1,4 @@
-"""[friction] of rig.toml: what the control law compensates, and what is refused."""
+"""[friction] of rig.toml sets the compensation of the control law."""
 
 import dataclasses
 from datetime import UTC, datetime
@@ -28,7 +28,7 @@ USED = ('[friction]\nmodel = "none"', '[friction]\nmodel = "calibrated"')
 
 
 def calibration(share=0.4, scale=1.0, **changes):
-    """Return the text of a calibration of an arm with a share of friction."""
+    """File of a calibration of an arm with a share of friction."""
     friction = draw_friction(CONSTANTS, share, None, np.zeros(7))
     friction = dataclasses.replace(friction, coulomb=scale * friction.coulomb)
     fit = FrictionFit(
@@ -60,7 +60,7 @@ def test_without_a_calibration_nothing_is_compensated(tmp_path):
     assert compensation(tmp_path) is None
 
 
-def test_with_one_the_law_has_a_compensation(folder):
+def test_a_calibration_gives_the_law_a_compensation(folder):
     assert compensation(folder) is not None
 
 
@@ -76,20 +76,20 @@ def test_a_missing_calibration_names_the_command_that_makes_it(folder):
     assert "traction calibrate friction" in error.value.hint
 
 
-def test_one_made_with_another_gravity_is_refused(folder):
+def test_a_calibration_with_another_gravity_is_refused(folder):
     (folder / "friction.toml").write_text(calibration(gravity="shipped"))
     with pytest.raises(SettingsError, match="gravity shipped"):
         compensation(folder)
 
 
-def test_friction_that_no_arm_has_is_refused_with_its_joint(folder):
+def test_implausible_friction_is_refused_with_its_joint(folder):
     (folder / "friction.toml").write_text(calibration(share=1.0, scale=3.0))
     with pytest.raises(SettingsError, match="joint 1"):
         compensation(folder)
 
 
 @pytest.mark.parametrize("name", ["deviation", "asymmetry_deviation"])
-def test_deviations_below_0_are_refused(folder, name):
+def test_negative_deviations_are_refused(folder, name):
     text = calibration()
     lines = text.splitlines()
     index = next(i for i, line in enumerate(lines) if line.startswith(f"{name} ="))
@@ -109,7 +109,7 @@ def test_a_share_that_could_move_the_arm_is_refused(folder, share):
         load_settings(rig)
 
 
-def test_the_preflight_tells_the_share_and_the_date(folder):
+def test_the_preflight_states_share_and_date(folder):
     settings = load_settings(folder / "rig.toml")
     words = law_words(settings.rig, read_law_calibrations(settings), "tread")
     assert "70%" in words
@@ -118,7 +118,7 @@ def test_the_preflight_tells_the_share_and_the_date(folder):
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-def test_the_trial_carries_calibration_and_share(folder):
+def test_a_trial_records_calibration_and_share(folder):
     done = run_short(folder / "rig.toml", folder, "TF", 1, "--friction", "0.4")
     assert done.code == 0, done.err
     (path,) = (only_session(folder) / "trials").glob("T??.mcap")

@@ -1,4 +1,4 @@
-"""[gravity] of rig.toml: what the control law weighs, and what is refused."""
+"""[gravity] of rig.toml sets the gravity model of the control law."""
 
 import dataclasses
 
@@ -24,7 +24,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 
 CONSTANTS = load_constants()
 POSES = np.random.default_rng(9).uniform(CONSTANTS.q_lower, CONSTANTS.q_upper, (10, 7))
-# The bare foot of this rig weighs otherwise than the one with a tread.
+# The bare foot of this rig is lighter than the one with a tread.
 LIGHTER = ("[feet.bare]\nmass = 0.45", "[feet.bare]\nmass = 0.38")
 
 
@@ -33,9 +33,9 @@ def use(model):
 
 
 def calibration(rig, foot="tread", **changes):
-    """Return the text of a calibration of an arm that is just as drawn."""
+    """File of a calibration of an arm that agrees with its drawings."""
     tool = build_tool(rig, foot)
-    found = GravityCalibration(
+    fitted = GravityCalibration(
         mus=moments_of_links(CONSTANTS, (tool.sensor, tool.foot)),
         residual=0.02,
         rank=12,
@@ -46,14 +46,14 @@ def calibration(rig, foot="tread", **changes):
         poses=POSES,
         torques=np.zeros((10, 7)),
     )
-    found = dataclasses.replace(found, **changes)
-    held = [gravity_torque(CONSTANTS, found.mus, q) for q in POSES]
-    return gravity_to_toml(dataclasses.replace(found, torques=np.array(held)))
+    fitted = dataclasses.replace(fitted, **changes)
+    torques = [gravity_torque(CONSTANTS, fitted.mus, q) for q in POSES]
+    return gravity_to_toml(dataclasses.replace(fitted, torques=np.array(torques)))
 
 
 @pytest.fixture
 def folder(tmp_path):
-    """Return a folder whose rig.toml uses the calibration beside it."""
+    """A folder whose rig.toml uses the calibration next to it."""
     config = write_config(tmp_path, rig=use("calibrated"))
     config.write_text(config.read_text().replace(*LIGHTER))
     rig = load_settings(config).rig
@@ -77,7 +77,7 @@ def test_a_calibration_serves_both_feet(folder, foot):
         assert model.gravity(q) == pytest.approx(truth.gravity(q), abs=1e-11)
 
 
-def test_the_feet_do_differ(folder):
+def test_the_gravity_of_both_feet_differs(folder):
     tread, bare = law(folder, "tread"), law(folder, "bare")
     differences = [tread.gravity(q) - bare.gravity(q) for q in POSES]
     assert np.abs(differences).max() > 0.3
@@ -94,7 +94,7 @@ def test_shipped_gravity_is_that_of_the_shipped_moments(tmp_path):
         assert model.gravity(q) == pytest.approx(expected, abs=1e-11)
 
 
-def test_a_foot_that_was_weighed_anew_is_refused_with_its_old_weight(folder):
+def test_a_changed_foot_is_refused_with_its_calibrated_mass(folder):
     config = folder / "rig.toml"
     config.write_text(config.read_text().replace("mass = 0.45", "mass = 0.46", 1))
     with pytest.raises(SettingsError) as caught:
@@ -103,7 +103,7 @@ def test_a_foot_that_was_weighed_anew_is_refused_with_its_old_weight(folder):
     assert "calibrate gravity again" in caught.value.hint
 
 
-def test_a_foot_that_rig_toml_has_not_is_refused(folder):
+def test_a_calibration_of_an_unknown_foot_is_refused(folder):
     path = folder / "gravity.toml"
     path.write_text(path.read_text().replace('foot = "tread"', 'foot = "claw"'))
     with pytest.raises(SettingsError, match="another tool: foot claw"):
@@ -126,7 +126,7 @@ def test_a_file_that_is_too_large_is_not_read(folder):
         read_law_calibrations(load_settings(folder / "rig.toml"))
 
 
-def test_what_does_not_move_the_arm_needs_no_calibration(folder):
+def test_status_needs_no_calibration(folder):
     (folder / "gravity.toml").unlink()
     config = folder / "rig.toml"
     done = traction("status", "--data", folder, "--config", config)
@@ -134,13 +134,13 @@ def test_what_does_not_move_the_arm_needs_no_calibration(folder):
 
 
 @pytest.mark.parametrize("model", ["mass", "CAD", ""])
-def test_a_model_nobody_knows_is_refused(tmp_path, model):
+def test_an_unknown_model_is_refused(tmp_path, model):
     config = write_config(tmp_path, rig=use(model))
     with pytest.raises(SettingsError, match=r"gravity\.model = .* expected"):
         load_settings(config)
 
 
-def test_the_preflight_says_which_foot_was_corrected(folder):
+def test_the_preflight_names_a_corrected_foot(folder):
     settings = load_settings(folder / "rig.toml")
     text = read_law_calibrations(settings).gravity
     assert gravity_words(settings.rig, text, "tread") == (
@@ -149,7 +149,7 @@ def test_the_preflight_says_which_foot_was_corrected(folder):
     assert "from tread to bare" in gravity_words(settings.rig, text, "bare")
 
 
-def test_a_trial_tells_its_gravity_and_keeps_the_file(folder, tmp_path):
+def test_a_trial_records_its_gravity_model_and_file(folder, tmp_path):
     data = tmp_path / "data"
     done = run_short(folder / "rig.toml", data)
     assert done.code == 0, done.err
@@ -161,7 +161,7 @@ def test_a_trial_tells_its_gravity_and_keeps_the_file(folder, tmp_path):
     assert "gravity calibrated 2027" in done.out
 
 
-def test_a_trial_by_the_drawings_says_so(first_trial):
+def test_a_trial_with_the_gravity_of_the_drawings_records_no_file(first_trial):
     reader = TrialReader(first_trial)
     assert reader.metadata["trial"]["gravity_model"] == "cad"
     assert "gravity.toml" not in reader.attachments

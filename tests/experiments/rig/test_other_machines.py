@@ -1,4 +1,4 @@
-"""What a machine that is no x86 can do."""
+"""A machine that is not x86 runs simulations in one thread only."""
 
 import platform
 
@@ -12,7 +12,7 @@ def on_arm(monkeypatch):
     monkeypatch.setattr(platform, "machine", lambda: "aarch64")
 
 
-def test_processes_are_not_started(config, tmp_path):
+def test_processes_are_refused(config, tmp_path):
     options = ("--fake", "--processes", "--config", config, "--data", tmp_path)
     done = traction("check", *options)
     assert done.code == 3

@@ -20,7 +20,7 @@ def nothing(*_):
 
 @pytest.fixture
 def tables():
-    """Return the tables of arm and recorder; those of a simulation have their test."""
+    """The tables of arm and recorder; those of a simulation have their own test."""
     clock, shared = SteppedClock(), SharedLayout.create()
     service = ArmService(ArmAccess(nothing, nothing, nothing, nothing), clock)
     yield service.handlers(), recorder_handlers(Recorder(shared, clock))
@@ -34,11 +34,11 @@ def test_functions_take_the_fields_of_their_requests(tables):
             assert list(inspect.signature(handler).parameters) == wanted, request
 
 
-def test_whatever_can_be_asked_of_the_arm_is_answered(tables):
+def test_every_request_to_the_arm_has_a_handler(tables):
     asked = {
         kind
         for _, kind in inspect.getmembers(requests, inspect.isclass)
         if issubclass(kind, requests.Request) and kind is not requests.Request
     }
-    # of a process, and of the one that reads a sensor
+    # the last two are answered by any process, and by that of the sensor
     assert {*tables[0], AskGrants, AskStream} == asked

@@ -36,7 +36,7 @@ NAMES = {
 
 @pytest.fixture
 def configured(tmp_path):
-    """Return a function that writes a rig.toml with a sensor of one kind."""
+    """A function that writes a rig.toml with a sensor of one kind."""
 
     def write(kind):
         text = KINDS[kind]

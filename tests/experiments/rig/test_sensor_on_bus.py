@@ -45,7 +45,7 @@ def trial(session):
     return session[0] / "trials" / "T01.mcap"
 
 
-def test_the_sensor_is_told_with_the_preflight_and_kept_with_the_trial(session, trial):
+def test_the_sensor_is_named_in_the_preflight_and_its_file(session, trial):
     folder, done, _ = session
     assert "Barrett force/torque sensor, node 8, 20 of 20 questions" in done.out
     assert sidecar(trial)["status"] == "complete"
@@ -68,11 +68,11 @@ def test_every_cycle_of_a_trial_has_its_raw_sample(trial):
     age = cycles["host_ns"].astype(np.int64) - cycles["ft_ns"].astype(np.int64)
     unasked = cycles["flags"] & Flag.ARM_UNASKED != 0
     assert set(age[~unasked]) == {2 * MS - 191_000}
-    # Seven positions less on the bus: its answer comes within the cycle.
+    # Seven positions less on the bus: the reply comes within the cycle.
     assert set(age[unasked]) == {-191_000}
 
 
-def test_the_foot_pushes_as_hard_as_a_serial_sensor_would_say(trial, first_trial):
+def test_the_force_agrees_with_that_of_a_serial_sensor(trial, first_trial):
     def median_force(path):
         traction_ = TrialReader(path).cycles().data["traction"]
         return np.median(traction_[traction_[:, 2] > 1.0], axis=0)[2]
@@ -81,7 +81,7 @@ def test_the_foot_pushes_as_hard_as_a_serial_sensor_would_say(trial, first_trial
     assert median_force(trial) == pytest.approx(median_force(first_trial), abs=1.0)
 
 
-def test_the_bus_log_has_an_answer_to_every_question_for_the_wrench(session):
+def test_the_bus_log_has_a_reply_to_every_request_for_the_wrench(session):
     lines = traction("replay", "--can", session[2], "--summary").out.splitlines()
     # The absent nodes of the enumeration; of 31, nine are there.
     assert " 22 did not come; 0 came without a request" in lines[0]
@@ -118,7 +118,9 @@ def test_a_sensor_on_the_bus_needs_no_serial_line(tmp_path):
         ("bota", "filter_hz = 150", '"robotous" and "optoforce"'),
     ],
 )
-def test_an_option_of_another_make_is_refused_by_name(tmp_path, kind, option, owners):
+def test_an_option_of_another_sensor_kind_is_refused_by_name(
+    tmp_path, kind, option, owners
+):
     text = (resources.files("experiments.data") / "rig.toml").read_text()
     text = without(text, ["sinc"])
     path = tmp_path / "rig.toml"
@@ -130,7 +132,7 @@ def test_an_option_of_another_make_is_refused_by_name(tmp_path, kind, option, ow
     assert f'"{kind}"' in done.err
 
 
-def test_a_value_of_a_make_is_named_without_the_make(tmp_path):
+def test_an_invalid_sensor_option_is_named_without_the_kind(tmp_path):
     config = write_config(tmp_path, rig=("sinc = 64", "sinc = 13"))
     done = traction("check", "--config-only", "--config", config)
     assert done.err.startswith(
@@ -138,7 +140,7 @@ def test_a_value_of_a_make_is_named_without_the_make(tmp_path):
     )
 
 
-def test_a_sensor_without_a_kind_names_those_that_are_known(tmp_path):
+def test_a_missing_sensor_kind_is_refused_with_an_example(tmp_path):
     config = write_config(tmp_path, rig=('kind = "bota"', ""))
     done = traction("check", "--config-only", "--config", config)
     assert done.err.startswith("rig.toml: ft_sensor.kind is missing, e.g. 'bota',")
@@ -153,7 +155,7 @@ def test_a_serial_sensor_needs_its_port(tmp_path):
     assert done.err.startswith("rig.toml: ft_sensor.port is missing, e.g. ")
 
 
-def test_an_unknown_kind_names_those_that_are_known(tmp_path):
+def test_an_unknown_sensor_kind_is_refused_with_the_known_kinds(tmp_path):
     config = write_config(tmp_path, rig=('kind = "bota"', 'kind = "optical"'))
     done = traction("check", "--config-only", "--config", config)
     assert done.code == 2
