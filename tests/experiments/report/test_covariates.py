@@ -1,4 +1,4 @@
-"""What the commands say of a column that was asked for."""
+"""A covariate that cannot be used is reported by the command."""
 
 import pytest
 
@@ -9,7 +9,7 @@ HEADER = "t,v_t,F_n,F_t,temp\n"
 
 @pytest.fixture
 def tables(tmp_path):
-    """Return two short tables with a further column."""
+    """Two short tables with an additional column."""
     paths = [tmp_path / f"T{k}.csv" for k in range(2)]
     for k, path in enumerate(paths):
         rows = (
@@ -22,14 +22,14 @@ def tables(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_column_that_cannot_be_tested_is_said_with_the_cause(tables, tmp_path):
+def test_a_column_that_cannot_be_tested_is_reported_with_the_cause(tables, tmp_path):
     to = ("--to", tmp_path / "fit", "--models", "tustin", "--covariate", "temp")
     done = traction("fit", *tables, *to)
     assert done.code == 0, done.err
     assert "temp: not tested (2 trials with samples, it takes 3)." in done.out
 
 
-def test_a_column_that_no_table_has_is_named_with_the_option(tables, tmp_path):
+def test_a_missing_column_is_named_with_the_option(tables, tmp_path):
     done = traction("fit", *tables, "--to", tmp_path / "fit", "--covariate", "wet")
     assert done.code == 2
     assert "no column wet" in done.err

@@ -3,8 +3,8 @@ import pytest
 from experiments.report.progress import ProgressLine, progress_text, time_left
 
 
-class Said:
-    """A console without a terminal, or with one."""
+class RecordingConsole:
+    """Console that records its output, with or without a terminal."""
 
     def __init__(self, *, is_live=False):
         self.is_live, self.lines, self.panels, self.ended = is_live, [], [], 0
@@ -20,7 +20,7 @@ class Said:
 
 
 class Now:
-    """A clock that stands where it is put."""
+    """Clock that the test sets."""
 
     t = 0.0
 
@@ -28,21 +28,21 @@ class Now:
         return int(self.t * 1e9)
 
 
-def test_the_rest_takes_as_long_as_what_was_done():
+def test_the_remaining_time_follows_from_the_pace_so_far():
     assert time_left(10, 30, 5.0) == pytest.approx(15.0)
     assert time_left(10, 0, 5.0) == 0.0
     assert time_left(0, 30, 5.0) is None
 
 
-def test_the_line_says_how_far_and_how_long():
+def test_the_progress_text_shows_count_and_remaining_time():
     assert progress_text(40, 80, 65.4, "fits").endswith("40 of 80 fits, 1 min 5 s left")
     assert progress_text(40, 80, 9.6, "fits").endswith("40 of 80 fits, 10 s left")
     assert progress_text(80, 80, 0.0, "fits").endswith("80 of 80 fits")
     assert progress_text(40, 80, None, "fits").startswith("━" * 15 + "─" * 15)
 
 
-def test_without_a_terminal_a_line_is_said_every_tenth():
-    console, clock = Said(), Now()
+def test_without_a_terminal_a_line_is_printed_at_every_tenth():
+    console, clock = RecordingConsole(), Now()
     line = ProgressLine(console, clock, "fits")
     for k in range(1, 101):
         clock.t = 0.5 * k
@@ -53,7 +53,7 @@ def test_without_a_terminal_a_line_is_said_every_tenth():
 
 
 def test_results_of_an_earlier_run_do_not_count_for_the_pace():
-    console, clock = Said(is_live=True), Now()
+    console, clock = RecordingConsole(is_live=True), Now()
     line = ProgressLine(console, clock, "fits")
     line(60, 100)
     clock.t = 10.0

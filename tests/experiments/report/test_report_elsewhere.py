@@ -1,4 +1,4 @@
-"""A report is written where it is told, and the data only read."""
+"""A report with `--to` is written there, and the data are only read."""
 
 import pytest
 
@@ -8,7 +8,7 @@ TUSTIN = ("--models", "tustin")
 
 
 def content(folder):
-    """Return the state of every file below a folder."""
+    """Modification time and size of every file below a folder."""
     return {
         path: (path.stat().st_mtime_ns, path.stat().st_size)
         for path in folder.rglob("*")
@@ -17,7 +17,7 @@ def content(folder):
 
 
 @pytest.mark.slow
-def test_a_report_elsewhere_leaves_the_data_as_they_are(recorded, tmp_path):
+def test_a_report_elsewhere_leaves_the_data_unchanged(recorded, tmp_path):
     before = content(recorded.data)
     done = traction(
         "report", "S001", "--data", recorded.data, "--to", tmp_path / "out", *TUSTIN
@@ -28,9 +28,7 @@ def test_a_report_elsewhere_leaves_the_data_as_they_are(recorded, tmp_path):
     assert content(recorded.data) == before
 
 
-def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_fitted(
-    recorded, tmp_path
-):
+def test_a_folder_that_cannot_be_created_is_refused_before_any_fit(recorded, tmp_path):
     (tmp_path / "file").write_text("in the way")
     out = tmp_path / "file" / "out"
     done = traction("report", "S001", "--data", recorded.data, "--to", out, *TUSTIN)

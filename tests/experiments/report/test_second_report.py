@@ -12,7 +12,7 @@ import analysis.study.study
 import analysis.study.tasks
 from tests.experiments.program import only_session, traction
 
-COMPUTED = (  # two trials have no components, and nothing is nothing to keep
+COMPUTED = (  # two trials have no components, so none are kept
     (analysis.study.study, "run_fold"),
     (analysis.study.study, "fit_terrain"),
     (analysis.study.study, "fit_planned"),
@@ -22,7 +22,7 @@ COMPUTED = (  # two trials have no components, and nothing is nothing to keep
 
 @pytest.fixture(scope="module")
 def reported(recorded, tmp_path_factory):
-    """Return data with a report, and what its fits.json holds."""
+    """Data with a report, and the content of its fits.json."""
     data = tmp_path_factory.mktemp("second") / "data"
     shutil.copytree(recorded.data, data)
     done = traction("report", "S001", "--data", data)
@@ -36,7 +36,7 @@ def numbers(data):
 
 @pytest.fixture
 def computed(monkeypatch):
-    """Return the names of what is computed while a test lasts."""
+    """Names of the functions that compute results during a test."""
     names = []
     for module, name in COMPUTED:
         function = getattr(module, name)
@@ -47,13 +47,13 @@ def computed(monkeypatch):
             return function(*arguments, **named)
 
         monkeypatch.setattr(module, name, seen)
-    # in workers nobody would see it
+    # calls in workers would not be recorded
     monkeypatch.setattr(analysis.study.tasks, "available_cores", lambda: 1)
     return names
 
 
 @pytest.mark.slow
-def test_a_second_report_computes_nothing_and_says_the_same(reported, computed):
+def test_a_second_report_computes_nothing_and_has_the_same_numbers(reported, computed):
     data, first = reported
     assert traction("report", "S001", "--data", data).code == 0
     assert computed == []
@@ -72,7 +72,7 @@ def test_damaged_results_are_computed_anew(reported, computed, tmp_path):
 
 
 @pytest.mark.slow
-def test_another_choice_of_samples_computes_what_it_touches(reported, computed):
+def test_another_choice_of_samples_computes_the_fits_anew(reported, computed):
     data, _ = reported
     done = traction("report", "S001", "--smooth", "15", "--data", data)
     assert done.code == 0, done.err
@@ -81,7 +81,7 @@ def test_another_choice_of_samples_computes_what_it_touches(reported, computed):
 
 @pytest.fixture
 def copied(reported, tmp_path):
-    """Return a copy of reported data whose report is up to date."""
+    """A copy of reported data whose report is up to date."""
     shutil.copytree(reported[0], tmp_path / "data")
     done = traction("report", "S001", "--data", tmp_path / "data")
     assert done.code == 0, done.err
@@ -95,7 +95,9 @@ def is_up_to_date(data, *options):
 
 
 @pytest.mark.slow
-def test_a_report_of_unchanged_data_says_so_and_reads_no_trial(copied, monkeypatch):
+def test_a_report_of_unchanged_data_is_up_to_date_and_reads_no_trial(
+    copied, monkeypatch
+):
     monkeypatch.setattr("experiments.report.sessions.load_trial", None)
     assert is_up_to_date(copied)
 
@@ -125,7 +127,7 @@ def test_a_report_is_made_again_if_anything_has_changed(copied, change, monkeypa
 
 
 @pytest.mark.slow
-def test_an_incomplete_report_says_so_every_time(copied):
+def test_an_incomplete_report_is_never_up_to_date(copied):
     session = only_session(copied)
     (session / "trials" / "T02.mcap").rename(session / "trials" / "T09.mcap")
     for _ in range(2):
@@ -134,7 +136,7 @@ def test_an_incomplete_report_says_so_every_time(copied):
 
 
 @pytest.mark.slow
-def test_a_record_that_cannot_be_written_costs_nothing(copied):
+def test_a_record_that_cannot_be_written_does_not_fail_the_report(copied):
     records = (copied / ".folds").glob("report-*.json")
     record = max(records, key=lambda path: path.stat().st_mtime_ns)
     record.unlink()

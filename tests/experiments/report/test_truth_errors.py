@@ -1,4 +1,4 @@
-"""What the program measures against what the simulation knows."""
+"""Measurements of simulated sessions agree with the truth of the simulation."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ def smooth(columns):
 
 
 def compare(recorded, name):
-    """Return (trial, measured, true): v_t, F_t, F_n of the cycles since the push."""
+    """(trial, measured, true): v_t, F_t, F_n of the cycles since the push."""
     path = recorded.folder / "trials" / f"{name}.mcap"
     trial = load_trial(path)
     truth = TrialReader(path.with_suffix(".truth.mcap")).truth().data
@@ -49,7 +49,7 @@ def test_measured_forces_follow_the_true_ones(recorded):
         _, measured, true = compare(recorded, name)
         errors.append(np.abs(measured[:, 1:] - true[:, 1:]).mean(axis=0))
         assert true[:, 2].max() > 2.0
-    # what a tare leaves of the sensor's zero is 0.3 to 0.4 N in the mean
+    # a tare leaves 0.3 to 0.4 N of the sensor's zero in the mean
     assert np.mean(errors, axis=0).max() <= 0.6
 
 
@@ -65,7 +65,7 @@ def test_recovered_friction_is_near_the_true_one(pair):
     trial, measured, true = pair
     truth = TrialReader(trial.path.with_suffix(".truth.mcap")).metadata["trial"]
     mu_k, b = float(truth["true:mu_k"]), float(truth["true:b"])
-    # What the tare has left of the sensor's bias is seen before and after the push.
+    # The bias that the tare has left is visible before and after the push.
     is_pushed = (true[:, 2] > 1.0) & (true[:, 0] > 0.03)
     _, F_t, F_n = (measured - true)[~is_pushed].mean(axis=0)
     series = trial.series()
@@ -77,7 +77,7 @@ def test_recovered_friction_is_near_the_true_one(pair):
     assert np.median(ratio) == pytest.approx(mu_k, rel=0.1)
 
 
-def test_sole_is_where_the_simulation_has_it(recorded):
+def test_the_sole_is_at_its_true_position(recorded):
     path = recorded.folder / "trials" / "T01.mcap"
     trial = load_trial(path)
     truth = TrialReader(path.with_suffix(".truth.mcap")).truth().data
