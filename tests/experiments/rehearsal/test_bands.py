@@ -15,11 +15,11 @@ from experiments.rehearsal.slip_measures import GroundTrials, measure_slips
 from tests.fakes.point_foot import PointFoot
 
 BAND = Band("X1", "something", 0.2, 0.4)
-# What a trial or two of three terrains can show.
+# Bands that a trial or two of three terrains can meet.
 QUICK = ("D1", "D2", "D3", "D4", "E1", "E3", "E4", "F1")
 
 
-def test_there_are_forty_three_bands_and_each_has_its_name():
+def test_bands_have_unique_names_and_ordered_limits():
     ids = [band.id for band in BANDS]
     assert len(ids) == len(set(ids)) == 43
     assert all(band.least < band.most for band in BANDS)
@@ -40,13 +40,13 @@ def test_a_band_is_met_when_every_value_is_inside(values, is_met):
     assert BandResult(BAND, values).is_met is is_met
 
 
-def test_what_was_not_measured_is_not_met():
+def test_a_band_without_a_measurement_is_not_met():
     found = compare_with_bands({"A2": [0.4]})
     assert [f.band.id for f in found if f.is_met] == ["A2"]
     assert found[-1].text == "none"
 
 
-def test_several_values_are_told_by_the_smallest_and_the_largest():
+def test_several_values_are_printed_as_their_range():
     assert BandResult(BAND, (0.31, 0.22, 0.28)).text == "0.22 .. 0.31"
 
 
@@ -66,7 +66,7 @@ def failed(grounds, ids):
 
 
 @pytest.mark.slow
-def test_stones_and_a_plate_by_themselves_meet_what_one_trial_can_show():
+def test_simulated_stones_and_plate_meet_the_bands_of_one_trial():
     grounds = {
         name: ground([PointFoot(name, 1, 1).run()], is_plate=name == "TF")
         for name in ("S0", "B0", "TF")
@@ -75,7 +75,7 @@ def test_stones_and_a_plate_by_themselves_meet_what_one_trial_can_show():
 
 
 def drawn(terrain, trial, *, seed=1, samples=4000):
-    """Return the toy: no dynamics, a line in F_n and v_t with coloured noise."""
+    """Toy trial without dynamics: a line in F_n and v_t with coloured noise."""
     rng = np.random.default_rng([seed, trial, len(terrain)])
     t = np.arange(samples) * 0.002
     wander = np.cumsum(rng.normal(size=(samples, 3)), axis=0)
@@ -111,7 +111,7 @@ def toy_measures():
     return study, measure_models(study)
 
 
-def test_own_errors_are_those_of_the_study(toy_measures):
+def test_own_errors_agree_with_the_study(toy_measures):
     study, measures = toy_measures
     plates = [study.terrains[n].mae(m) for m in (TUSTIN, GP_SE) for n in ("TF", "Tf")]
     assert sorted(measures["A1"]) == pytest.approx(sorted(plates))
@@ -120,14 +120,14 @@ def test_own_errors_are_those_of_the_study(toy_measures):
     assert measures["A4"] == pytest.approx([np.mean(stones)])
 
 
-def test_foreign_errors_are_those_of_the_cross_table(toy_measures):
+def test_foreign_errors_agree_with_the_cross_table(toy_measures):
     study, measures = toy_measures
     cross = study.cross(GP_SE)
     expected = cross["S0"]["TF"] / cross["TF"]["TF"]
     assert min(abs(value - expected) for value in measures["B6"]) < 1e-9
 
 
-def test_plates_and_stones_are_told_apart_and_twins_are_not(toy_measures):
+def test_plates_and_stones_are_distinguished_and_twins_are_not(toy_measures):
     _, measures = toy_measures
     assert measures["B8"] == [1.0]
     assert measures["B9"][0] < 1.0  # S0 and B0 are drawn from one law
@@ -139,19 +139,19 @@ def test_a_model_of_stones_is_worse_on_plates_in_every_fold(toy_measures):
     assert measures["B10"] == [8.0]
 
 
-def test_coloured_noise_is_remembered_for_tens_of_milliseconds(toy_measures):
+def test_coloured_noise_is_correlated_over_tens_of_milliseconds(toy_measures):
     _, measures = toy_measures
     assert all(0.9 < value <= 1.0 for value in measures["C3"])
     assert measures["C4"][0] < min(measures["C3"])
 
 
-def test_the_toy_fails_most_of_what_dynamics_would_show(toy_measures):
+def test_all_bands_of_models_are_measured(toy_measures):
     _, measures = toy_measures
     assert set(measures) == {b.id for b in BANDS if b.id[0] in "ABC"} | {"E7"}
 
 
 @pytest.mark.slow
-def test_plates_are_known_by_their_stones_and_not_by_their_names(toy_measures):
+def test_plates_are_recognised_by_their_stones_and_not_by_their_names(toy_measures):
     study, measures = toy_measures
     names = {"S0": "Tundra", "B0": "Trail", "TF": "Sand", "Tf": "Beach"}
     stones = {"S0": "small", "B0": "big", "TF": "none", "Tf": "none"}
@@ -169,7 +169,7 @@ def test_plates_are_known_by_their_stones_and_not_by_their_names(toy_measures):
     assert renamed["B8"] == [1.0]  # stones and plates are never confused
 
 
-def test_a_study_without_plates_has_no_such_measures(toy_measures):
+def test_a_study_without_plates_has_no_measures_of_models(toy_measures):
     study, _ = toy_measures
     stones = {n: r for n, r in study.terrains.items() if n in ("S0", "B0")}
     assert measure_models(replace(study, terrains=stones)) == {}
@@ -183,7 +183,7 @@ def resting(level, later):
     return TractionSeries("TF", "TF-1", t, v_t, np.full(1000, 3.0), F_t, "none")
 
 
-def test_the_force_at_rest_is_that_of_the_first_four_tenths_of_a_second():
+def test_the_force_at_rest_is_taken_from_the_start_of_a_trial():
     levels = (0.1, 0.5, 0.3)
     plate = ground([resting(level, 9.0) for level in levels], is_plate=True)
     stones = ground([PointFoot("S0", 1, 1).run()], is_plate=False)
