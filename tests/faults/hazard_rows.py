@@ -769,7 +769,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "with mech_at_home: modulo a motor turn (joint 1: 0.15 rad). By torques that are 0.1 N m rms off: a standard deviation of 0.5 degrees at joint 2, 0.9 at joint 3, 4 at joints 4 and 5; joints 1, 6 and 7 do not show. The residual of 1 N is 13 degrees of the foot's weight",
             (
-                "tests/experiments/preflight/test_zero_check.py::test_five_degrees_in_any_joint_are_noticed_and_the_joint_is_named",
+                "tests/experiments/preflight/test_zero_check.py::test_a_wrong_zero_of_any_joint_is_refused_with_the_joint",
                 "tests/wam/model/test_zero_errors.py::test_a_large_zero_error_is_refused_with_its_joint",
                 "tests/wam/model/test_zero_errors.py::test_a_wrong_zero_of_joints_1_6_and_7_is_not_observable",
             ),
@@ -865,7 +865,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "residual of 1 N where the bias is known",
             (
-                "tests/experiments/preflight/test_foot_check.py::test_another_foot_is_confirmed_and_stands_on_the_page",
+                "tests/experiments/preflight/test_foot_check.py::test_another_foot_is_confirmed_and_shown_on_the_preflight_page",
             ),
         ),
         "drifting": (

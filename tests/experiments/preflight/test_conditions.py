@@ -1,4 +1,4 @@
-"""The conditions of a session, also of one that lacks settings of today."""
+"""The conditions of a session, also of a session older than some settings."""
 
 import io
 from contextlib import redirect_stdout
@@ -38,7 +38,7 @@ def without(values, *names):
     return {name: value for name, value in values.items() if name not in names}
 
 
-def test_conditions_are_read_as_they_were_written(folder):
+def test_conditions_are_read_as_written(folder):
     write_conditions(folder, NOW)
     assert read_conditions(folder) == NOW
 
@@ -48,18 +48,18 @@ def test_damaged_conditions_are_empty(folder):
     assert read_conditions(folder) == {}
 
 
-def test_a_setting_that_is_younger_than_the_session_had_its_default(folder):
+def test_a_setting_newer_than_the_session_counts_as_its_default(folder):
     write_conditions(folder, without(NOW, LATER))
     assert check(folder, NOW) == []
 
 
-def test_a_younger_setting_that_is_not_at_its_default_is_named(folder):
+def test_a_newer_setting_that_is_not_at_its_default_is_named(folder):
     write_conditions(folder, without(NOW, LATER))
     with pytest.raises(SessionError, match=f"{LATER} was {DEFAULTS[LATER]}, is 4000"):
         check(folder, {**NOW, LATER: "4000"})
 
 
-def test_a_whole_section_may_be_younger(folder):
+def test_a_whole_section_may_be_newer_than_the_session(folder):
     section = [name for name in NOW if name.startswith("rig.safety.")]
     write_conditions(folder, without(NOW, *section))
     assert len(section) > 2
@@ -72,29 +72,29 @@ def test_a_missing_setting_without_a_default_is_a_difference(folder):
     assert text.startswith("rig.limits.foot_speed was not there")
 
 
-def test_a_setting_that_is_not_known_any_more_is_left_out(folder):
+def test_a_setting_that_no_longer_exists_is_ignored(folder):
     write_conditions(folder, {**NOW, "rig.limits.of_old": "3"})
     assert check(folder, NOW) == []
 
 
-def test_what_no_number_depends_on_has_no_default_either():
+def test_settings_of_the_operator_are_no_conditions():
     assert not [name for name in DEFAULTS if name.startswith("rig.operator.")]
 
 
-def test_optional_settings_of_the_sensor_in_use_are_compared_as_they_are_written():
+def test_defaults_of_the_sensor_in_use_are_no_differences():
     assert default_conditions("bota")["rig.ft_sensor.calibration"] == "None"
     now = {"rig.ft_sensor.kind": "bota", "rig.ft_sensor.calibration": "None"}
     assert differences({"rig.ft_sensor.kind": "bota"}, now) == []
     assert differences({"rig.ft_sensor.sinc": "64"}, {}) == []
 
 
-def test_a_default_of_the_sensor_that_was_changed_since_is_named():
+def test_a_changed_default_of_the_sensor_is_named():
     now = {"rig.ft_sensor.kind": "bota", "rig.ft_sensor.calibration": "other.toml"}
     (text,) = differences({"rig.ft_sensor.kind": "bota"}, now)
     assert "rig.ft_sensor.calibration" in text
 
 
-def test_a_younger_setting_of_a_foot_had_its_default():
+def test_a_newer_setting_of_a_foot_counts_as_its_default():
     shape = "rig.feet.round.shape"
     now = {**NOW, **default_conditions(feet=["round"])}
     assert now[shape] == "None"

@@ -10,7 +10,7 @@ from tests.experiments.program import only_session, traction
 
 @pytest.fixture
 def data(recorded, tmp_path):
-    """Return a copy of the data with a session of the foot with tread, TF."""
+    """A copy of the data with a session of TF and the foot tread."""
     shutil.copytree(recorded.data, tmp_path / "data")
     return tmp_path / "data"
 
@@ -31,7 +31,7 @@ def run(config, data, terrain, script):
     return traction("run", terrain, *options, "--operator-script", script_file)
 
 
-def test_the_first_session_asks_for_no_foot(tmp_path):
+def test_there_is_no_last_foot_before_the_first_session(tmp_path):
     assert last_foot(tmp_path, is_simulated=True) is None
 
 
@@ -44,7 +44,7 @@ def test_the_last_foot_is_that_of_the_session_open_last(data):
     assert (last.folder.id, last.foot) == ("S002", "bare")
 
 
-def test_simulated_sessions_say_nothing_about_the_real_foot(data):
+def test_simulated_sessions_do_not_state_the_real_foot(data):
     assert last_foot(data, is_simulated=False) is None
 
 
@@ -54,7 +54,7 @@ def test_damaged_conditions_name_no_foot(data):
 
 
 @pytest.mark.slow
-def test_another_foot_is_confirmed_and_stands_on_the_page(config, data):
+def test_another_foot_is_confirmed_and_shown_on_the_preflight_page(config, data):
     done = run(config, data, "Tf", "last\nlast\n")  # no trial at all
     assert "S001 was recorded with the foot tread; Tf needs the foot bare." in done.out
     (folder,) = (data / "sessions").glob("*_S002_Tf.fake")

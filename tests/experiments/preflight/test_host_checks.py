@@ -46,8 +46,8 @@ def governed(folder, *names):
     ],
 )
 def test_a_slow_governor_comes_with_its_fix(tmp_path, names, mark, text):
-    found = check_governor(governed(tmp_path, *names))
-    assert (found.mark, found.text) == (mark, text)
+    check = check_governor(governed(tmp_path, *names))
+    assert (check.mark, check.text) == (mark, text)
 
 
 def test_changed_code_is_marked():
@@ -67,9 +67,9 @@ def samples(count=400, *, noise=0.05, age_ms=2.0):
 
 
 def test_a_healthy_sensor_is_shown_with_rate_age_and_noise():
-    found = check_wrenches(samples(), NOW_NS, 6.0)
-    assert found.mark == GOOD
-    assert found.text == "800 Hz, age 2.0 ms, noise 0.05 N"
+    check = check_wrenches(samples(), NOW_NS, 6.0)
+    assert check.mark == GOOD
+    assert check.text == "800 Hz, age 2.0 ms, noise 0.05 N"
 
 
 @pytest.mark.parametrize("trouble", [{"noise": 2.0}, {"age_ms": 9.0}])
@@ -80,15 +80,15 @@ def test_noise_and_age_are_marked(trouble):
 def test_saturation_is_marked():
     records = samples()
     records["saturated"][3] = 0b100
-    found = check_wrenches(records, NOW_NS, 6.0)
-    assert found.mark == WARNING
-    assert found.text.endswith("1 saturated (Fz)")
+    check = check_wrenches(records, NOW_NS, 6.0)
+    assert check.mark == WARNING
+    assert check.text.endswith("1 saturated (Fz)")
 
 
 @pytest.mark.parametrize("count", [0, 1])
-def test_a_sensor_that_says_nothing_is_marked(count):
-    found = check_wrenches(samples(5)[:count], NOW_NS, 6.0)
-    assert (found.mark, found.text) == (WARNING, f"{count} while the loop was tested")
+def test_a_sensor_without_samples_is_marked(count):
+    check = check_wrenches(samples(5)[:count], NOW_NS, 6.0)
+    assert (check.mark, check.text) == (WARNING, f"{count} while the loop was tested")
 
 
 SERIAL = {"frames": "4000", "lost": "0", "bad_checks": "0", "bursts": "3"}
@@ -104,17 +104,17 @@ SERIAL = {"frames": "4000", "lost": "0", "bad_checks": "0", "bursts": "3"}
         ({"trouble": "The port is gone."}, BAD, "The port is gone."),
     ],
 )
-def test_a_stream_is_graded_by_what_became_of_it(change, mark, word):
-    found = check_stream({**SERIAL, "reads": "2500", **change})
-    assert found.mark == mark
-    assert word in found.text
+def test_a_stream_is_graded_by_loss_damage_and_latency(change, mark, word):
+    check = check_stream({**SERIAL, "reads": "2500", **change})
+    assert check.mark == mark
+    assert word in check.text
 
 
 def test_a_sensor_on_the_bus_has_no_stream():
     assert check_stream({"samples": "20"}) is None
 
 
-def test_the_largest_traction_is_told():
+def test_the_largest_measurable_traction_is_stated():
     fields = {"ranges": "500 500 1200 15 15 12"}
     # 15 N m at a tenth of a metre
     assert reach_words(fields, 0.1) == "F_t up to 150 N"
@@ -128,7 +128,7 @@ def test_the_largest_traction_is_told():
         ("lab/rig.toml", False, GOOD),
     ],
 )
-def test_shipped_settings_are_red_on_a_real_arm(origin, is_simulated, mark):
+def test_shipped_settings_are_bad_on_a_real_arm(origin, is_simulated, mark):
     rig = SimpleNamespace(
         settings=SimpleNamespace(origin=origin),
         row=SimpleNamespace(name="S0"),
@@ -153,7 +153,7 @@ NOW = datetime(2027, 5, 1, tzinfo=UTC)
 
 
 def rig_with(gravity="", friction="", **files):
-    """Return what is asked of a rig whose calibrations have these texts."""
+    """Rig whose calibration files have these texts."""
     section = SimpleNamespace(
         gravity=SimpleNamespace(file="gravity.toml"),
         friction=SimpleNamespace(file="friction.toml"),
@@ -193,11 +193,11 @@ def test_calibrations_in_use_are_graded_by_their_age():
     "text",
     ["rms = 1", "measured_utc = 5", made("2027-99-01"), "= broken", 'a = "'],
 )
-def test_a_calibration_that_states_no_day_is_due(text):
+def test_a_calibration_without_a_date_is_due(text):
     assert measured_at(text) is None
-    found = check_ages(rig_with(friction=text))
-    assert found.mark == WARNING
-    assert f"of unknown age (due after {CALIBRATION_DAYS['friction']}" in found.text
+    check = check_ages(rig_with(friction=text))
+    assert check.mark == WARNING
+    assert f"of unknown age (due after {CALIBRATION_DAYS['friction']}" in check.text
 
 
 def dated(moment):
@@ -205,17 +205,17 @@ def dated(moment):
 
 
 @pytest.mark.parametrize("minutes", [-1, 0, 4])
-def test_a_calibration_just_ahead_of_the_clock_is_of_today(minutes):
+def test_a_calibration_just_ahead_of_the_clock_counts_as_of_today(minutes):
     made_now = dated(NOW + timedelta(minutes=minutes))
-    found = check_ages(rig_with(friction=made_now))
-    assert (found.mark, found.text) == (GOOD, "friction.toml 0 d")
+    check = check_ages(rig_with(friction=made_now))
+    assert (check.mark, check.text) == (GOOD, "friction.toml 0 d")
 
 
 @pytest.mark.parametrize("ahead", [timedelta(minutes=6), timedelta(days=4000)])
 @pytest.mark.parametrize("kind", ["gravity", "friction"])
-def test_a_calibration_whose_date_has_not_come_is_due(kind, ahead):
-    found = check_ages(rig_with(**{kind: dated(NOW + ahead)}))
-    assert found.mark == WARNING
+def test_a_calibration_dated_in_the_future_is_due(kind, ahead):
+    check = check_ages(rig_with(**{kind: dated(NOW + ahead)}))
+    assert check.mark == WARNING
     day = f"{NOW + ahead:%Y-%m-%d %H:%M} UTC"
-    assert f"{kind}.toml dated {day} (not yet come; set the clock, then" in found.text
-    assert f"traction calibrate {kind})" in found.text
+    assert f"{kind}.toml dated {day} (not yet come; set the clock, then" in check.text
+    assert f"traction calibrate {kind})" in check.text

@@ -1,4 +1,4 @@
-"""What the computer at an arm needs: printed, written below a root, nothing else."""
+"""`traction setup` prints what it writes below a root, and writes nothing else."""
 
 import sys
 
@@ -31,7 +31,7 @@ def root(tmp_path):
     return folder
 
 
-def test_what_is_printed_is_what_is_written(root):
+def test_the_printed_files_are_the_written_ones(root):
     printed = traction("setup", "--sensor-serial", "A1", "--user", "someone").out
     assert written(root) == set()
     assert install(root, "--user", "someone").code == 0
@@ -44,9 +44,7 @@ def test_what_is_printed_is_what_is_written(root):
     assert "systemctl enable traction-can0.service" in printed
 
 
-def test_a_second_time_changes_nothing_and_other_settings_are_written_anew(
-    root, tmp_path
-):
+def test_a_second_setup_changes_nothing_and_new_settings_are_written(root, tmp_path):
     install(root)
     again = install(root)
     assert "as they should be" in again.out
@@ -56,7 +54,7 @@ def test_a_second_time_changes_nothing_and_other_settings_are_written_anew(
     assert "link set can1 up txqueuelen 16 type can bitrate 1000000" in unit
 
 
-def test_a_file_of_somebody_else_is_left_alone(root):
+def test_a_foreign_file_is_left_alone(root):
     rules = root / "etc/udev/rules.d/80-traction.rules"
     rules.parent.mkdir(parents=True)
     rules.write_text("mine\n")
@@ -67,7 +65,7 @@ def test_a_file_of_somebody_else_is_left_alone(root):
     assert rules.read_text() == "mine\n"
 
 
-def test_no_link_of_an_image_leads_out_of_it(root, tmp_path):
+def test_a_link_out_of_the_root_is_refused(root, tmp_path):
     outside = tmp_path / "outside"
     outside.mkdir()
     (root / "etc").mkdir()
@@ -87,14 +85,14 @@ def test_no_link_of_an_image_leads_out_of_it(root, tmp_path):
         ("--sensor-serial", ""),
     ],
 )
-def test_names_that_could_be_read_otherwise_are_refused(option, value, root):
+def test_unsafe_or_empty_names_are_refused(option, value, root):
     done = install(root, f"{option}={value}")
     assert done.code == 2
     assert "Nothing was written" in done.err
     assert written(root) == set()
 
 
-def test_a_bus_that_is_no_socketcan_has_no_unit(root, tmp_path):
+def test_a_bus_without_socketcan_has_no_unit(root, tmp_path):
     config = write_config(tmp_path, rig=('"socketcan"', '"slcan"'))
     install(root, "--config", config)
     assert not [name for name in written(root) if "systemd" in name]

@@ -1,4 +1,4 @@
-"""What was measured on another arm is refused before the arm is driven."""
+"""Calibrations of another arm are refused before the arm is driven."""
 
 from types import SimpleNamespace
 
@@ -38,18 +38,18 @@ def marks(rig):
     return [line[0] for line in lines], ""
 
 
-def test_files_of_this_arm_and_files_that_do_not_say_are_used(tmp_path):
+def test_calibrations_of_this_arm_or_of_an_unnamed_one_are_used(tmp_path):
     assert marks(rig_of(tmp_path, ARM, arm=ARM)) == ([GOOD], "")
     assert marks(rig_of(tmp_path, ARM)) == ([GOOD], "")
 
 
-def test_an_arm_that_does_not_say_is_not_judged(tmp_path):
+def test_an_arm_without_serial_numbers_is_not_checked(tmp_path):
     assert marks(rig_of(tmp_path, None, arm=ARM)) == ([], "")
 
 
 def test_gravity_of_another_arm_is_refused(tmp_path):
-    found, words = marks(rig_of(tmp_path, REPAIRED, arm=ARM))
-    assert found == [BAD]
+    grades, words = marks(rig_of(tmp_path, REPAIRED, arm=ARM))
+    assert grades == [BAD]
     assert "gravity.toml was measured with other pucks: puck 7 was 1207" in words
 
 
@@ -60,11 +60,11 @@ def test_a_zero_of_another_arm_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("serials", "is_simulated", "known"),
+    ("serials", "is_simulated", "expected"),
     [(ARM, False, ARM), (ARM, True, None), ((None, *ARM[1:]), False, None)],
 )
-def test_only_a_real_arm_has_serial_numbers_and_all_of_them(
-    serials, is_simulated, known
+def test_only_a_real_arm_with_all_serial_numbers_has_an_identity(
+    serials, is_simulated, expected
 ):
-    info = SimpleNamespace(pucks=[SimpleNamespace(serial=each) for each in serials])
-    assert serial_numbers(SimpleNamespace(is_simulated=is_simulated), info) == known
+    info = SimpleNamespace(pucks=[SimpleNamespace(serial=number) for number in serials])
+    assert serial_numbers(SimpleNamespace(is_simulated=is_simulated), info) == expected

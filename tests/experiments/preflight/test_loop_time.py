@@ -1,4 +1,4 @@
-"""How long the preflight measures the loop."""
+"""The preflight measures the loop for the configured or the requested time."""
 
 import re
 from dataclasses import replace
@@ -14,7 +14,7 @@ from experiments.settings.rig import LoopSection
 
 
 def measured(tmp_path, capsys, *seconds):
-    """Return how long the loop was measured [s] with `test_time = 0.7`."""
+    """Time for which the loop was measured [s] with `test_time = 0.7`."""
     given = load_settings(None)
     loop = given.rig.loop.model_copy(update={"test_time": 0.7})
     settings = replace(given, rig=given.rig.model_copy(update={"loop": loop}))
@@ -27,15 +27,15 @@ def measured(tmp_path, capsys, *seconds):
     return float(re.search(r"loop ([\d.]+) s", capsys.readouterr().out)[1])
 
 
-def test_rig_toml_says_how_long(tmp_path, capsys):
+def test_the_loop_is_measured_for_the_time_of_rig_toml(tmp_path, capsys):
     assert measured(tmp_path, capsys) == 0.7
 
 
-def test_a_command_may_say_otherwise(tmp_path, capsys):
+def test_a_command_may_set_another_time(tmp_path, capsys):
     assert measured(tmp_path, capsys, 0.6) == 0.6
 
 
-def test_five_seconds_are_the_default():
+def test_the_default_time_is_unchanged():
     assert LoopSection().test_time == 5.0
 
 

@@ -1,4 +1,4 @@
-"""What is said of an arm that cannot be reached over SocketCAN."""
+"""The refusal of an arm that is not reached over SocketCAN names what helps."""
 
 import pytest
 
@@ -20,12 +20,12 @@ def refusal(error, monkeypatch):
     return str(refused.value)
 
 
-def test_an_interface_that_is_down_comes_with_the_command_that_helps(monkeypatch):
+def test_an_interface_that_is_down_is_named_with_its_setup_command(monkeypatch):
     text = refusal(LinkError("can0 is down."), monkeypatch)
     assert setup_command("can0", 1_000_000) in text
 
 
-def test_a_full_queue_is_no_missing_adapter(monkeypatch):
+def test_a_full_queue_is_not_reported_as_a_missing_adapter(monkeypatch):
     full = LinkFullError("The queue is full.", hint="Nobody acknowledges.")
     text = refusal(full, monkeypatch)
     assert "Nobody acknowledges." in text

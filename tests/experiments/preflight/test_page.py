@@ -1,4 +1,4 @@
-"""One check that fails does not hide the next."""
+"""A failed check does not hide the next one."""
 
 import pytest
 
@@ -27,10 +27,10 @@ def test_disk_arm_and_sensor_are_all_graded(tmp_path):
     assert [graded[name] for name in ("disk", "arm", "F/T")] == [BAD, BAD, BAD]
     assert "GB free, a session needs" in done.err  # the first of them
     assert done.out.count("Also: ") == 2
-    assert "idle" not in done.out + done.err  # nobody knows of a silent arm
+    assert "idle" not in done.out + done.err  # the state of a silent arm is unknown
 
 
-def test_an_arm_without_zero_is_asked_the_rest(tmp_path):
+def test_an_arm_that_is_not_zeroed_is_checked_further(tmp_path):
     done = refused(tmp_path, "not-zeroed")
     graded = marks(done)
     assert (graded["zero"], graded["exchange"], graded["F/T"]) == (BAD, GOOD, GOOD)
@@ -65,5 +65,5 @@ def test_the_interface_of_the_kernel_is_graded(monkeypatch, state, mark, word):
     assert word in result.text
 
 
-def test_an_interface_that_is_missing_is_left_to_the_arms_check():
+def test_a_missing_interface_is_left_to_the_check_of_the_arm():
     assert check_interface("nocan17") is None

@@ -1,4 +1,4 @@
-"""What is odd at the start-up is seen at every start, and stands in the recording."""
+"""Warnings of the start-up are shown at every start and stored in the recording."""
 
 import json
 
@@ -14,14 +14,14 @@ SET_VL2, GET_PEN = (0x00A, 0xAE), (0x00A, 0x2B)
 
 
 @pytest.fixture
-def odd_module(monkeypatch):
-    """Serve a safety module that keeps its VL2 and does not show its pendant."""
+def deaf_module(monkeypatch):
+    """Serve a safety module that keeps its VL2 and does not report its pendant."""
     serve(monkeypatch, prepare=deaf_to(SET_VL2, GET_PEN))
 
 
 @pytest.fixture(scope="module")
 def faster(tmp_path_factory):
-    """Return settings whose speed limit is not the module's own."""
+    """Settings whose speed limit is not the module's own."""
     folder = tmp_path_factory.mktemp("faster")
     return write_config(folder, rig=("speed_fault = 1.0", "speed_fault = 1.5"))
 
@@ -30,7 +30,7 @@ def start_up_lines(text):
     return [line for line in text.splitlines() if "▲ start-up" in line]
 
 
-@pytest.mark.usefixtures("odd_module")
+@pytest.mark.usefixtures("deaf_module")
 def test_check_shows_each_warning_and_calls_the_rig_fit(faster, tmp_path):
     options = ("--fake", "--fast", "--config", faster, "--data", tmp_path)
     done = traction("check", *options)
@@ -41,14 +41,14 @@ def test_check_shows_each_warning_and_calls_the_rig_fit(faster, tmp_path):
     assert len(start_up_lines(done.out)) == 2
 
 
-@pytest.mark.usefixtures("odd_module")
+@pytest.mark.usefixtures("deaf_module")
 def test_zero_shows_each_warning(faster):
     done = traction("zero", "--fake", "--yes", "--config", faster)
     assert done.code == 0, done.err
     assert len(start_up_lines(done.out)) == 2
 
 
-@pytest.mark.usefixtures("odd_module")
+@pytest.mark.usefixtures("deaf_module")
 def test_a_session_shows_the_warnings_and_records_them(faster, tmp_path):
     done = run_short(faster, tmp_path)
     assert done.code == 0, done.err
@@ -68,7 +68,7 @@ def test_an_arm_as_documented_records_its_firmware_and_no_warning(first_trial):
 
 
 @pytest.mark.parametrize(("vers", "warnings"), [(40, 1), (60, 0), (250, 2)])
-def test_check_drives_old_and_new_firmware(monkeypatch, tmp_path, vers, warnings):
+def test_check_accepts_old_and_new_firmware(monkeypatch, tmp_path, vers, warnings):
     serve(monkeypatch, firmware(vers))
     done = traction("check", "--fake", "--fast", "--data", tmp_path)
     assert done.code == 0, done.err

@@ -1,4 +1,4 @@
-"""A wrong zero is noticed at the start where the encoders at home are known."""
+"""A wrong zero is noticed at the start if the encoder counts at home are known."""
 
 import re
 
@@ -20,23 +20,23 @@ FIVE_DEGREES = float(np.radians(5.0))
 JOINTS = range(1, 8)
 
 
-def told(q):
-    """Return the positions that an arm at `q` [rad] tells, well zeroed."""
+def reported(q):
+    """Positions [counts] reported by a well-zeroed arm at `q` [rad]."""
     return np.floor(TURNS * CONSTANTS.j2mp @ q + 0.5)
 
 
 def mech(q):
-    """Return the absolute angles of an arm that is at `q` [rad]."""
-    return (NOTED + told(q) - TURNS * CONSTANTS.j2mp @ CONSTANTS.home) % TURN
+    """Absolute encoder counts of an arm at `q` [rad]."""
+    return (NOTED + reported(q) - TURNS * CONSTANTS.j2mp @ CONSTANTS.home) % TURN
 
 
 def error_of(q, offset):
-    """Return the error of an arm at `q` that tells `q + offset` [rad]."""
-    return zero_error(CONSTANTS, CTS, told(q + offset), mech(q), NOTED)
+    """Zero error of an arm at `q` that reports `q + offset` [rad]."""
+    return zero_error(CONSTANTS, CTS, reported(q + offset), mech(q), NOTED)
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_a_right_zero_is_never_doubted_wherever_the_arm_is(seed):
+def test_a_correct_zero_is_accepted_in_any_pose(seed):
     rng = np.random.default_rng(seed)
     q = rng.uniform(CONSTANTS.q_lower, CONSTANTS.q_upper)
     error = error_of(q, np.zeros(7))
@@ -46,7 +46,7 @@ def test_a_right_zero_is_never_doubted_wherever_the_arm_is(seed):
 
 @pytest.mark.parametrize("joint", JOINTS)
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_five_degrees_in_any_joint_are_noticed_and_the_joint_is_named(joint, sign):
+def test_a_wrong_zero_of_any_joint_is_refused_with_the_joint(joint, sign):
     offset = np.zeros(7)
     offset[joint - 1] = sign * FIVE_DEGREES
     q = np.array([0.1, 0.7, -0.2, 1.2, 0.3, 1.1, -0.4])
@@ -58,21 +58,21 @@ def test_five_degrees_in_any_joint_are_noticed_and_the_joint_is_named(joint, sig
 
 
 @pytest.mark.parametrize("joint", range(2, 7))
-def test_an_error_is_told_as_large_as_it_is(joint):
+def test_the_size_of_a_zero_error_is_determined(joint):
     offset = np.zeros(7)
     offset[joint - 1] = FIVE_DEGREES
     error = error_of(np.zeros(7), offset)
     assert error[joint - 1] == pytest.approx(-FIVE_DEGREES, abs=1e-3)
 
 
-def test_a_whole_turn_of_a_motor_is_not_seen():
+def test_a_whole_turn_of_a_motor_is_not_detected():
     offset = np.zeros(7)
     offset[0] = 2.0 * np.pi / 42.0
     check_zero(error_of(np.zeros(7), offset))
 
 
 def check_with(folder, patch, angles):
-    """Check a simulated arm as if it were the real one that `angles` were noted of."""
+    """Check a simulated arm as if it were real and `angles` its counts at home."""
     patch.setattr(Rig, "is_simulated", property(lambda rig: False))
     line = f"mech_at_home = {[int(a) % TURN for a in angles]} # "
     config = write_config(folder, rig=("# mech_at_home = [...] ", line))
@@ -83,16 +83,14 @@ def check_with(folder, patch, angles):
 AT_HOME = np.floor(TURNS * CONSTANTS.j2mp @ CONSTANTS.home)
 
 
-def test_the_page_says_that_the_zero_is_right(tmp_path, monkeypatch):
+def test_the_preflight_page_confirms_a_correct_zero(tmp_path, monkeypatch):
     done = check_with(tmp_path, monkeypatch, AT_HOME)
     assert done.code == 0, done.err
     assert re.search(r"✔ zero +0\.000\d rad off at most", done.out)
 
 
 @pytest.mark.parametrize("joint", JOINTS)
-def test_an_arm_zeroed_elsewhere_is_refused_before_anything_is_recorded(
-    tmp_path, monkeypatch, joint
-):
+def test_an_arm_zeroed_elsewhere_is_refused_by_check(tmp_path, monkeypatch, joint):
     turned = np.zeros(7)
     turned[joint - 1] = FIVE_DEGREES
     angles = np.round(AT_HOME + TURNS * CONSTANTS.j2mp @ turned)
@@ -103,7 +101,7 @@ def test_an_arm_zeroed_elsewhere_is_refused_before_anything_is_recorded(
 
 
 @pytest.mark.parametrize(("more", "is_refused"), [(0.0, False), (1e-6, True)])
-def test_an_error_is_refused_from_the_limit_on(more, is_refused):
+def test_a_zero_error_is_refused_beyond_the_limit_only(more, is_refused):
     error = np.zeros(7)
     error[4] = -HOME_LIMIT - more
     if not is_refused:
