@@ -17,7 +17,7 @@ from tests.experiments.program import traction
 
 @pytest.fixture
 def data(tmp_path):
-    """Return data with a small session that has a flight recording."""
+    """Data with a small session that has a flight record."""
     lay_out(tmp_path)
     folder = find_session(tmp_path, "S001").path
     (folder / "faults").mkdir(exist_ok=True)
@@ -27,7 +27,7 @@ def data(tmp_path):
 
 
 def bundled(data, *others):
-    """Return what is left out, and the files of the archive by name."""
+    """Reasons of the files left out, and the files of the archive by name."""
     to = data / "S001.bundle.zip"
     contents = write_bundle(find_session(data, "S001"), to, others)
     with zipfile.ZipFile(to) as archive:
@@ -35,7 +35,7 @@ def bundled(data, *others):
     return contents.left_out, files
 
 
-def test_small_files_flight_recordings_and_named_logs_are_in_it(data):
+def test_a_bundle_holds_small_files_flight_records_and_named_logs(data):
     log = data / "bus.log"
     log.write_text("(1.000000) can0 404#30\n")
     left_out, files = bundled(data, log)
@@ -55,22 +55,22 @@ def test_the_manifest_names_versions_and_every_file(data):
     assert {file["name"] for file in manifest["files"]} == set(files)
 
 
-def test_files_of_one_name_and_links_that_a_person_names_are_taken(data):
+def test_named_files_of_equal_name_and_named_links_are_included(data):
     for name in ("a", "b"):
         (data / name).mkdir()
         (data / name / "bus.log").write_text(name)
     (data / "link.log").symlink_to(data / "a" / "bus.log")
     named = [data / "a/bus.log", data / "b/bus.log", data / "link.log"]
     _, files = bundled(data, *named)
-    found = {n: c for n, c in files.items() if n.startswith("others/")}
-    assert found == {
+    others = {n: c for n, c in files.items() if n.startswith("others/")}
+    assert others == {
         "others/1_bus.log": b"a",
         "others/2_bus.log": b"b",
         "others/3_link.log": b"a",
     }
 
 
-def test_what_is_too_large_is_left_out_by_name(data, monkeypatch):
+def test_a_file_that_is_too_large_is_left_out_and_named(data, monkeypatch):
     monkeypatch.setattr("experiments.export.bundle.LARGEST", 50_000)
     left_out, files = bundled(data)
     assert left_out["faults/T03.flight.mcap"].startswith("is larger than")
@@ -94,7 +94,7 @@ def test_a_bundle_is_never_overwritten(data):
     assert refused.value.hint.startswith("Choose another name.")
 
 
-def test_the_command_says_first_that_names_are_in_it(data, tmp_path):
+def test_the_command_first_warns_of_names_and_notes(data, tmp_path):
     to = tmp_path / "help.zip"
     done = traction("bundle", "S001", "--to", to, "--data", data)
     assert done.code == 0, done.err

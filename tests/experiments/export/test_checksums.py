@@ -1,4 +1,4 @@
-"""A folder held against its list of checksums."""
+"""A folder compared with its list of checksums."""
 
 import os
 import shutil
@@ -55,20 +55,20 @@ def test_a_folder_behind_a_link_is_not_entered(folder, tmp_path_factory):
 
 
 @pytest.mark.parametrize("content", [b"nonsense\n", b"\xff\xfe\n", b"0" * 64 + b" a\n"])
-def test_a_list_that_is_none_is_refused_with_its_line(folder, content):
+def test_an_invalid_list_is_refused_with_its_line(folder, content):
     with (folder / SUMS).open("ab") as file:
         file.write(content)
     with pytest.raises(TrialFileError, match="line 3 is not a checksum"):
         changed_files(folder)
 
 
-def test_a_list_that_is_missing_is_named(folder):
+def test_a_missing_list_is_named(folder):
     (folder / SUMS).unlink()
     with pytest.raises(TrialFileError, match=SUMS):
         changed_files(folder)
 
 
-def test_a_changed_digit_in_the_list_is_seen(folder):
+def test_a_changed_digit_in_the_list_is_noticed(folder):
     text = (folder / SUMS).read_text()
     digit = "0" if text[0] != "0" else "1"
     (folder / SUMS).write_text(digit + text[1:])
@@ -84,8 +84,8 @@ def test_a_folder_of_too_many_files_is_refused(folder, monkeypatch):
 
 
 @pytest.mark.slow
-def test_more_than_a_hundred_thousand_files_are_refused(folder):
-    """Names of few files: what they hold is not looked at any more."""
+def test_more_files_than_the_shipped_limit_are_refused(folder):
+    """Hard links to few files; their contents are not read."""
     many = folder / "many"
     many.mkdir()
     few = [folder / f"{number}.txt" for number in range(4)]
@@ -104,7 +104,7 @@ def test_more_than_a_hundred_thousand_files_are_refused(folder):
     ("size", "problem"),
     [(16_000_000, "line 3 is not a checksum"), (16_000_001, "is larger than")],
 )
-def test_a_list_is_read_up_to_sixteen_megabytes(folder, size, problem):
+def test_a_list_is_read_up_to_the_shipped_limit(folder, size, problem):
     os.truncate(folder / SUMS, size)
     with pytest.raises(TrialFileError, match=problem):
         changed_files(folder)

@@ -1,4 +1,4 @@
-"""Who publishes what: DataCite, CITATION.cff and licences, as other programs read."""
+"""DataCite, CITATION.cff and licence of a publication, as other programs read them."""
 
 import argparse
 import json
@@ -20,7 +20,7 @@ from experiments.export.credits import (
     readme_text,
 )
 
-# The ORCID of the documentation of ORCID itself.
+# The example of ORCID's own documentation.
 ORCID = "0000-0002-1825-0097"
 
 
@@ -36,7 +36,7 @@ def about():
     )
 
 
-def test_an_author_has_a_name_and_perhaps_an_orcid():
+def test_an_author_has_a_name_and_an_optional_orcid():
     assert parse_author("Doe, Jane") == Author("Doe, Jane")
     assert parse_author(f" Doe, Jane <{ORCID}> ") == Author("Doe, Jane", ORCID)
     assert parse_author(f"Doe <https://orcid.org/{ORCID}>") == Author("Doe", ORCID)
@@ -46,7 +46,7 @@ def test_an_author_has_a_name_and_perhaps_an_orcid():
     "text",
     ["", "<>", "Doe <0000-0002-1825-0098>", "Doe <1>", "Doe <x", "a\nb", "x" * 400],
 )
-def test_what_is_no_author_is_refused(text):
+def test_an_invalid_author_is_refused(text):
     with pytest.raises(SettingsError, match="--author"):
         parse_author(text)
 
@@ -79,7 +79,7 @@ def test_a_citation_has_what_its_format_requires(about):
         ("Institute of Loose Stones", "Organizational"),
     ],
 )
-def test_datacite_tells_persons_from_organisations(about, text, kind):
+def test_datacite_distinguishes_persons_from_organisations(about, text, kind):
     by_one = replace(about, authors=[parse_author(text)])
     (creator,) = json.loads(datacite_json(by_one))["creators"]
     assert creator["nameType"] == kind
@@ -111,7 +111,7 @@ def test_the_readme_names_terrains_and_how_to_check(about):
     assert "traction verify . --rebuild" in text
 
 
-def test_the_command_offers_every_licence_that_there_is():
+def test_the_command_offers_every_licence():
     parser = argparse.ArgumentParser()
     publish.add_arguments(parser)
     usage = parser.format_usage()

@@ -1,4 +1,4 @@
-"""The program's own trials, written as ROS 2 topics at 500 Hz and imported back."""
+"""Trials written as ROS 2 topics and imported again agree with their recordings."""
 
 import re
 from dataclasses import replace
@@ -33,7 +33,7 @@ FRAMES = """
 
 
 def write_topics(path, cycles, times):
-    """Write the standard topics of cycles at their times [UTC ns], a message each."""
+    """Write the standard topics of cycles, one message at each of `times` [UTC ns]."""
     with path.open("wb") as file:
         writer = Writer(file)
         writer.start(profile="ros2", library="test")
@@ -63,7 +63,7 @@ def write_frames(folder, reader, trial, sole):
 
 @pytest.fixture(scope="module")
 def own(first_trial, tmp_path_factory):
-    """Return a trial, its reader, and a function that imports its topics."""
+    """A trial, and a function that imports its topics."""
     folder = tmp_path_factory.mktemp("topics")
     trial, reader = load_trial(first_trial), TrialReader(first_trial)
     urdf = write_frames(folder, reader, trial, trial.sole_point)
@@ -83,7 +83,7 @@ def own(first_trial, tmp_path_factory):
     return trial, imported
 
 
-def test_an_own_trial_comes_back_as_it_was(own):
+def test_an_imported_trial_agrees_with_its_recording(own):
     trial, imported = own
     (back,) = imported().trials
     rows = min(len(back.t), len(trial.t))
@@ -105,7 +105,7 @@ def test_an_own_trial_comes_back_as_it_was(own):
     assert kept == pytest.approx(right, rel=0.01)
 
 
-# What standard topics do not carry: flags of the sensor, and what joint 7 was to be.
+# Standard topics carry no flags of the sensor and no target of joint 7.
 UNSEEN = {"an axis saturated", "force samples stale", "foot loose by 0.1 rad"}
 FLAGGED = [
     row
@@ -153,10 +153,10 @@ def source():
 
 @pytest.fixture
 def disturbed(source, tmp_path):
-    """Return a function that disturbs a recording and says what its import says."""
+    """A function that disturbs a recording; the warnings of its import."""
     trial, reader = load_trial(source), TrialReader(source)
 
-    def says(disturb):
+    def warnings_of(disturb):
         cycles = reader.cycles().data.copy()
         recording = Recording(cycles, trial.payload, trial.frame, trial.sole_point)
         try:
@@ -164,25 +164,25 @@ def disturbed(source, tmp_path):
         except SettingsError as error:
             return [error.message]
 
-    return says
+    return warnings_of
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("row", FLAGGED, ids=lambda row: row.name)
-def test_a_disturbed_recording_is_refused_or_named(disturbed, row):
+def test_a_disturbed_recording_is_refused_or_gives_a_warning(disturbed, row):
     usual = {re.sub(r"[-+]?[0-9.]+", "", text) for text in disturbed(lambda r: r)}
-    found = {re.sub(r"[-+]?[0-9.]+", "", text) for text in disturbed(row.disturb)}
-    assert found - usual, usual
+    shown = {re.sub(r"[-+]?[0-9.]+", "", text) for text in disturbed(row.disturb)}
+    assert shown - usual, usual
 
 
-def test_an_own_recording_itself_is_refused_with_who_reads_it(own, first_trial):
+def test_an_import_of_a_trial_file_is_refused(own, first_trial):
     _, imported = own
     request = imported().request
     with pytest.raises(SettingsError, match="this is a trial of Traction"):
         import_log(replace(request, log=first_trial))
 
 
-def test_what_a_log_says_of_its_devices_goes_along(first_trial, tmp_path):
+def test_the_simulation_mark_of_a_log_is_kept_by_an_import(first_trial, tmp_path):
     log = tmp_path / "T01.mcap"
     log.write_bytes(standard_topics(TrialReader(first_trial)))
     with open_log(log) as opened:

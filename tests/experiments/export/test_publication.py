@@ -1,4 +1,4 @@
-"""A study that is published: a crate that others validate, check and compute again."""
+"""A published study is a crate that others can validate, check and rebuild."""
 
 import csv
 import io
@@ -34,12 +34,12 @@ def entities(text):
     return {entity["@id"]: entity for entity in json.loads(text)["@graph"]}
 
 
-# --- in short: a crate of a few files -------------------------------------------------
+# --- a crate of a few files -----------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
 def small_crate(tmp_path_factory):
-    """Return a folder of six files with its metadata."""
+    """A folder of six files with its metadata."""
     folder = tmp_path_factory.mktemp("crate")
     for name in ("config.toml", *RECORDED, "fits.csv", "LICENSE.md"):
         (folder / name).write_text(name)
@@ -78,8 +78,8 @@ def small_crate(tmp_path_factory):
 
 
 def test_every_file_of_a_crate_has_its_checksum(small_crate):
-    found = entities((small_crate / METADATA).read_text())
-    files = {k: e for k, e in found.items() if e["@type"] == "File"}
+    by_id = entities((small_crate / METADATA).read_text())
+    files = {k: e for k, e in by_id.items() if e["@type"] == "File"}
     assert set(files) == {p.name for p in small_crate.iterdir()} - {METADATA}
     for name, entity in files.items():
         assert entity["sha256"] == digest(small_crate / name)
@@ -95,15 +95,15 @@ def test_a_crate_names_profile_licence_and_author(small_crate):
 
 
 def test_every_recording_is_an_action_with_tool_times_and_files(small_crate):
-    found = entities((small_crate / METADATA).read_text())
-    first, second = found["#trial-S001-T01"], found["#trial-S001-T02"]
+    by_id = entities((small_crate / METADATA).read_text())
+    first, second = by_id["#trial-S001-T01"], by_id["#trial-S001-T02"]
     assert first["startTime"] == "2027-03-14T10:14:05+00:00"
     assert first["endTime"] == "2027-03-14T10:14:26+00:00"
     assert first["object"] == {"@id": "config.toml"}
     assert first["result"] == {"@id": "T01.mcap"}
     assert first["instrument"] == {"@id": f"swh:1:rev:{'0123456789' * 4}"}
     assert second["instrument"]["@id"].startswith("urn:uuid:")
-    mentioned = {entity["@id"] for entity in found["./"]["mentions"]}
+    mentioned = {entity["@id"] for entity in by_id["./"]["mentions"]}
     assert mentioned == {"#trial-S001-T01", "#trial-S001-T02", "#study"}
 
 
@@ -119,7 +119,7 @@ def test_equal_tables_do_not_differ():
 
 
 @pytest.mark.parametrize(("factor", "differs"), [(1 + 4e-10, False), (1 + 3e-9, True)])
-def test_a_number_may_differ_by_a_billionth(factor, differs):
+def test_a_number_may_differ_by_rounding_only(factor, differs):
     again = TABLE.replace("0.5", repr(0.5 * factor))
     result = compare_tables(TABLE, again)
     assert bool(result.different) is differs
@@ -138,12 +138,12 @@ def test_a_number_may_differ_by_a_billionth(factor, differs):
         TABLE.replace("0.0,N", "1e-6,N"),
     ],
 )
-def test_a_row_that_is_missing_new_or_other_is_a_difference(again):
+def test_a_missing_new_or_changed_row_is_a_difference(again):
     assert compare_tables(TABLE, again).different
 
 
 @pytest.mark.parametrize("text", ["a,b\n1,2\n", TABLE.replace("0.5", "much")])
-def test_what_is_no_table_of_results_is_refused(text):
+def test_an_invalid_table_of_results_is_refused(text):
     with pytest.raises(SettingsError, match=r"fits\.csv"):
         compare_tables(text, TABLE)
 
@@ -163,7 +163,7 @@ def test_without_rocrate_the_extra_is_named_and_nothing_written(
     assert not to.exists()
 
 
-def test_a_folder_that_holds_something_is_not_published_into(recorded, tmp_path):
+def test_publishing_into_a_folder_that_is_not_empty_is_refused(recorded, tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
     options = ("--to", tmp_path, *AUTHOR, "--data", recorded.data)
     done = traction("publish", "S001", *options)
@@ -174,13 +174,13 @@ def test_a_folder_that_holds_something_is_not_published_into(recorded, tmp_path)
 @pytest.mark.parametrize(
     "options", [("--licence", "CC0-1.0"), ("--author", "Doe"), (*AUTHOR[:3], "mine")]
 )
-def test_author_and_licence_have_to_be_named(tmp_path, options):
+def test_author_and_licence_must_be_named(tmp_path, options):
     done = traction("publish", "S001", "--to", tmp_path / "crate", *options)
     assert done.code == 2
     assert "usage: traction publish" in done.err
 
 
-def test_a_session_is_no_publication_to_rebuild(recorded):
+def test_a_rebuild_of_a_session_is_refused(recorded):
     done = traction("verify", "S001", "--rebuild", "--data", recorded.data)
     assert done.code == 2
     assert "traction verify crate" in done.err
@@ -202,14 +202,14 @@ def published(recorded, tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_a_published_session_is_in_line_with_its_journal(published):
+def test_a_published_session_agrees_with_its_journal(published):
     files = published.glob("sessions/*/trials/*.json")
     assert sorted(path.name for path in files) == ["T01.json", "T02.json"]
     assert list(published.glob("sessions/*/rejected/*")) == []
 
 
 @pytest.mark.slow
-def test_a_publication_is_as_it_was_written(published):
+def test_an_unchanged_publication_is_verified(published):
     done = traction("verify", published)
     assert (done.code, done.err) == (0, "")
 
@@ -232,7 +232,9 @@ def test_one_changed_byte_of_a_publication_is_named(published, tmp_path, name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["T02.mcap", "T02.json", "fits.csv"])
-def test_a_file_taken_out_with_its_checksum_is_missed(published, tmp_path, name):
+def test_a_file_removed_with_its_checksum_is_reported_missing(
+    published, tmp_path, name
+):
     copy = tmp_path / "crate"
     shutil.copytree(published, copy)
     (path,) = (copy / "sessions").rglob(name) if name[0] == "T" else copy.rglob(name)
@@ -244,7 +246,7 @@ def test_a_file_taken_out_with_its_checksum_is_missed(published, tmp_path, name)
 
 
 @pytest.mark.slow
-def test_a_trial_taken_out_with_all_that_describes_it_is_missed(published, tmp_path):
+def test_a_trial_removed_with_its_description_is_reported_missing(published, tmp_path):
     copy = tmp_path / "crate"
     shutil.copytree(published, copy)
     for path in list((copy / "sessions").rglob("T02.*")):
@@ -262,7 +264,7 @@ def test_a_trial_taken_out_with_all_that_describes_it_is_missed(published, tmp_p
 
 
 def _forget(folder, file, name):
-    """Take the line of a file out of a list of checksums."""
+    """Remove the line of a file from a list of checksums."""
     lines = (folder / file).read_text().splitlines(keepends=True)
     kept = [line for line in lines if not line.endswith(f"  {name}\n")]
     assert len(kept) == len(lines) - 1
@@ -270,7 +272,7 @@ def _forget(folder, file, name):
 
 
 @pytest.mark.slow
-def test_results_are_computed_again_from_the_recordings(published):
+def test_results_are_rebuilt_from_the_recordings(published):
     before = set(published.rglob("*"))
     done = traction("verify", published, "--rebuild")
     assert (done.code, done.err) == (0, "")
@@ -283,7 +285,7 @@ def test_results_are_computed_again_from_the_recordings(published):
 
 
 @pytest.mark.slow
-def test_a_result_that_the_recordings_do_not_give_is_named(published, tmp_path):
+def test_a_forged_result_is_named_by_a_rebuild(published, tmp_path):
     copy = tmp_path / "crate"
     shutil.copytree(published, copy)
     table = copy / "results" / "fits.csv"
@@ -293,7 +295,7 @@ def test_a_result_that_the_recordings_do_not_give_is_named(published, tmp_path):
     table.write_text("\n".join([rows[0], ",".join(cells), *rows[2:]]) + "\n")
     sums = (copy / "SHA256SUMS").read_text().splitlines()
     kept = [line for line in sums if not line.endswith("  results/fits.csv")]
-    kept.append(f"{digest(table)}  results/fits.csv")  # somebody who knows how
+    kept.append(f"{digest(table)}  results/fits.csv")  # the list is forged, too
     (copy / "SHA256SUMS").write_text("\n".join(kept) + "\n")
     done = traction("verify", copy, "--rebuild")
     assert done.code == 6

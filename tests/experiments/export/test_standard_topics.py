@@ -1,4 +1,4 @@
-"""Recordings as standard topics at 500 Hz: the same numbers as `/cycle`, as rosbags."""
+"""Exported standard topics hold the same numbers as `/cycle`, as read by rosbags."""
 
 import hashlib
 
@@ -37,13 +37,13 @@ def messages(path, topic):
 
 
 @pytest.mark.parametrize("topic", sorted(TOPICS))
-def test_there_is_a_message_of_every_cycle(standard, first_trial, topic):
+def test_every_topic_has_a_message_of_every_cycle(standard, first_trial, topic):
     rows = TrialReader(first_trial).cycles()
     times = [time for time, _ in messages(standard, topic)]
     assert times == rows.log_time.tolist()
 
 
-def test_numbers_are_those_of_the_cycles(standard, first_trial):
+def test_messages_hold_the_numbers_of_the_cycles(standard, first_trial):
     cycles = TrialReader(first_trial).cycles().data
     joints = [message for _, message in messages(standard, "/joint_states")]
     assert np.array_equal([m.position for m in joints], cycles["position"])
@@ -52,16 +52,16 @@ def test_numbers_are_those_of_the_cycles(standard, first_trial):
     forces = [(w.force.x, w.force.y, w.force.z) for w in wrenches]
     assert np.array_equal(forces, cycles["wrench"][:, :3])
     poses = [message.pose for _, message in messages(standard, "/foot/pose")]
-    places = [(p.position.x, p.position.y, p.position.z) for p in poses]
-    assert np.array_equal(places, cycles["foot_position"])
+    positions = [(p.position.x, p.position.y, p.position.z) for p in poses]
+    assert np.array_equal(positions, cycles["foot_position"])
     twists = [message.twist for _, message in messages(standard, "/foot/twist")]
     turns = [(t.angular.x, t.angular.y, t.angular.z) for t in twists]
     assert np.array_equal(turns, cycles["foot_velocity"][:, 3:])
 
 
 def test_the_robot_has_every_frame_that_a_message_names(standard, first_trial):
-    ((_, told),) = messages(standard, "/robot_description")
-    robot = parse_urdf(standard, told.data.encode())
+    ((_, description),) = messages(standard, "/robot_description")
+    robot = parse_urdf(standard, description.data.encode())
     names = {
         m.header.frame_id for topic in TOPICS for _, m in messages(standard, topic)
     }
@@ -75,14 +75,14 @@ def test_the_robot_has_every_frame_that_a_message_names(standard, first_trial):
     assert path.sensor == pytest.approx(turned, abs=1e-9)
 
 
-def test_nothing_but_standard_types_is_inside(standard):
+def test_a_bag_holds_standard_types_only(standard):
     with AnyReader([standard]) as bag:
         topics = {c.topic: c.msgtype for c in bag.connections}
     assert set(topics) == {*TOPICS, "/robot_description"}
     assert not any("traction" in name for name in topics.values())
 
 
-def test_metadata_say_simulated_and_of_which_recording(standard, first_trial):
+def test_metadata_state_simulation_and_source_recording(standard, first_trial):
     from mcap.reader import make_reader
 
     with standard.open("rb") as file:
@@ -95,7 +95,7 @@ def test_metadata_say_simulated_and_of_which_recording(standard, first_trial):
     assert {"terrain.toml", "ft_calibration.toml", "robot.urdf"} <= names
 
 
-def test_it_is_told_apart_from_a_trial(standard):
+def test_a_bag_is_not_read_as_a_trial(standard):
     with pytest.raises(TrialFileError, match=r"no trial of Traction.*/joint_states"):
         TrialReader(standard)
 

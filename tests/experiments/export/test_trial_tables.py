@@ -48,7 +48,7 @@ def numbers(path, name):
 
 
 def half_steps():
-    """Return the largest rounding of every column of numbers, with its unit."""
+    """Largest rounding error of every numeric column, by the name with its unit."""
     return {
         f"{name} [{q.unit}]": 0.5 * 10.0**-q.decimals
         for q in QUANTITIES
@@ -76,7 +76,7 @@ def test_a_number_differs_from_the_recording_by_half_a_step_at_most(
         "q7 [rad]": TrialReader(first_trial).cycles().data["position"][:, 6],
     }
     written = numbers(exported / recorded.folder.name / "T01.csv", name)
-    # a hair for the binary form of decimal numbers
+    # with a tolerance for the binary form of decimal numbers
     assert np.abs(written - recordings[name]).max() <= half_steps()[name] * (1 + 1e-9)
 
 
@@ -93,9 +93,7 @@ def test_a_force_has_no_digit_below_a_tenth_of_a_count(exported, recorded):
     assert max(digits) == 4  # a count is 1/256 N
 
 
-def test_a_velocity_has_two_digits_more_so_that_the_window_keeps_the_same(
-    exported, recorded
-):
+def test_a_velocity_has_more_digits_than_its_resolution(exported, recorded):
     _, columns = table(exported / recorded.folder.name / "T01.csv")
     digits = {
         len(cell.partition(".")[2]) for cell in columns["v_t [m/s]"] if "e" not in cell
@@ -157,7 +155,7 @@ def test_checksums_of_all_files_are_right(exported):
     assert all(digest(exported / name) == value for name, value in listed.items())
 
 
-def test_simulated_trials_say_so_in_the_index(exported, first_trial):
+def test_simulated_trials_are_marked_in_the_index(exported, first_trial):
     with (exported / "trials.csv").open() as file:
         first, second = csv.DictReader(file)
     assert first["simulated"] == second["simulated"] == "true"
@@ -172,7 +170,7 @@ def test_an_export_overwrites_nothing(recorded, exported):
 
 @pytest.fixture
 def frictionless_report():
-    """Return a function that validates a package with Frictionless's own program."""
+    """A function that validates a package with Frictionless's own program."""
 
     def validate(folder: Path):
         with system.use_context(trusted=True):
@@ -251,7 +249,7 @@ def test_a_single_table_takes_its_terrain_from_the_package(
     assert list(load_tables([path], terrain="mine")) == ["mine"]
 
 
-def test_a_parquet_table_knows_its_terrain_alone(in_parquet, recorded, tmp_path):
+def test_a_parquet_table_alone_states_its_terrain(in_parquet, recorded, tmp_path):
     path = tmp_path / "T01.parquet"
     path.write_bytes((in_parquet / recorded.folder.name / "T01.parquet").read_bytes())
     ((terrain, (trial,)),) = load_tables([path]).items()
@@ -259,7 +257,7 @@ def test_a_parquet_table_knows_its_terrain_alone(in_parquet, recorded, tmp_path)
 
 
 @pytest.mark.parametrize("form", ["csv", "parquet"])
-def test_kept_tables_are_known_to_be_prepared(exported, in_parquet, recorded, form):
+def test_kept_tables_are_recognised_as_prepared(exported, in_parquet, recorded, form):
     folder = exported if form == "csv" else in_parquet
     path = folder / recorded.folder.name / f"T01.kept.{form}"
     ((_, (trial,)),) = load_tables([path]).items()
@@ -275,7 +273,7 @@ def test_fit_reports_an_exported_folder_as_simulated(in_parquet, tmp_path):
     assert "SIMULATED" in (tmp_path / "fit" / "report" / "index.html").read_text()
 
 
-def test_fit_mixes_no_simulated_with_recorded_tables(exported, recorded, tmp_path):
+def test_fit_refuses_to_mix_simulated_and_recorded_tables(exported, recorded, tmp_path):
     name = f"{recorded.folder.name}/T01.csv"
     real = tmp_path / "real.csv"
     with (exported / name).open() as file:

@@ -1,4 +1,4 @@
-"""What has to be in a publication, by its list, its description and its journals."""
+"""A file is missed in a publication if list, description or journal names the file."""
 
 import json
 
@@ -15,7 +15,7 @@ SESSION = "sessions/2027-01-15_S001_TF.fake"
 
 @pytest.fixture
 def crate(tmp_path):
-    """Return a small publication: a session, a table, a description and sums."""
+    """A small publication: a session, a table, a description and checksums."""
     for name, content in session_files().items():
         if name.startswith(f"{SESSION}/"):
             target = tmp_path / name
@@ -47,22 +47,22 @@ def texts(crate):
     return [change.text() for change in changed_publication(crate)]
 
 
-def test_a_publication_as_it_was_written_has_no_change(crate):
+def test_an_unchanged_publication_has_no_change(crate):
     assert texts(crate) == []
 
 
-def test_a_file_that_only_the_description_still_names_is_missed(crate):
+def test_a_missing_file_named_only_by_the_description_is_reported(crate):
     (crate / "fits.csv").unlink()
     sum_again(crate)
     assert texts(crate) == [f"fits.csv is missing; {METADATA} names it"]
 
 
-def test_a_file_that_is_missing_is_named_once(crate):
+def test_a_missing_file_is_named_once(crate):
     (crate / "fits.csv").unlink()
     assert texts(crate) == ["fits.csv is missing"]
 
 
-def test_a_trial_that_only_the_journal_still_names_is_missed(crate):
+def test_a_missing_trial_named_only_by_the_journal_is_reported(crate):
     (crate / SESSION / "trials" / "T02.mcap").unlink()
     files = [p for p in crate.rglob("*") if p.is_file() and p.name != SUMS]
     describe(crate, [{"@type": "File", "@id": name_of(crate, p)} for p in files])
@@ -70,26 +70,26 @@ def test_a_trial_that_only_the_journal_still_names_is_missed(crate):
     assert texts(crate) == [f"{SESSION}/trials/T02.mcap is missing"]
 
 
-def test_a_trial_that_all_still_name_is_missed_once(crate):
+def test_a_missing_trial_named_by_all_is_reported_once(crate):
     (crate / SESSION / "trials" / "T02.mcap").unlink()
     assert texts(crate) == [f"{SESSION}/trials/T02.mcap is missing"]
 
 
-def test_a_description_that_is_gone_is_missed_whatever_the_list_says(crate):
+def test_a_missing_description_is_reported_with_and_without_the_list(crate):
     (crate / METADATA).unlink()
     assert texts(crate) == [f"{METADATA} is missing"]
     sum_again(crate)
     assert texts(crate) == [f"{METADATA} is missing"]
 
 
-def test_a_description_that_was_changed_is_no_witness(crate):
+def test_a_changed_description_is_not_trusted(crate):
     content = (crate / METADATA).read_text()
     (crate / METADATA).write_text(content.replace("fits.csv", "gits.csv"))
     assert texts(crate) == [f"{METADATA} is changed"]
 
 
 @pytest.mark.parametrize("content", ["[]", "{}", '{"@graph": {}}', "no json"])
-def test_a_description_of_no_crate_is_refused(crate, content):
+def test_an_invalid_description_is_refused(crate, content):
     (crate / METADATA).write_text(content)
     sum_again(crate)
     with pytest.raises(TrialFileError, match="describes no crate"):
@@ -99,19 +99,19 @@ def test_a_description_of_no_crate_is_refused(crate, content):
 @pytest.mark.parametrize(
     "name", ["../out.txt", "/etc/nothing", "https://example.org/b", "a/../../c", 7]
 )
-def test_what_lies_elsewhere_is_not_looked_for(crate, name):
+def test_files_outside_the_publication_are_ignored(crate, name):
     describe(crate, [{"@type": "File", "@id": name}])
     sum_again(crate)
     assert texts(crate) == []
 
 
-def test_what_is_no_file_is_not_looked_for(crate):
+def test_entities_that_are_not_files_are_ignored(crate):
     describe(crate, [{"@type": "Person", "@id": "somebody"}])
     sum_again(crate)
     assert texts(crate) == []
 
 
-def test_a_trial_that_description_and_journal_name_is_missed_once(crate):
+def test_a_missing_trial_named_by_description_and_journal_is_reported_once(crate):
     (crate / SESSION / "trials" / "T02.mcap").unlink()
     sum_again(crate)
     assert texts(crate) == [
@@ -119,7 +119,7 @@ def test_a_trial_that_description_and_journal_name_is_missed_once(crate):
     ]
 
 
-def test_a_file_that_the_description_names_twice_is_missed_once(crate):
+def test_a_missing_file_that_is_described_twice_is_reported_once(crate):
     (crate / "fits.csv").unlink()
     describe(crate, [{"@type": "File", "@id": "fits.csv"}] * 2)
     sum_again(crate)
@@ -128,14 +128,14 @@ def test_a_file_that_the_description_names_twice_is_missed_once(crate):
 
 def test_a_journal_with_two_faults_is_named_once(crate):
     journal = crate / SESSION / "events.jsonl"
-    every = journal.read_bytes().splitlines(keepends=True)
-    journal.write_bytes(b"".join(every[:4] + every[5:8]))
+    lines = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(b"".join(lines[:4] + lines[5:8]))
     sum_again(crate)
-    found = [text for text in texts(crate) if "events.jsonl" in text]
-    assert len(found) == 1
+    named = [text for text in texts(crate) if "events.jsonl" in text]
+    assert len(named) == 1
 
 
-def test_a_description_of_too_much_is_refused_and_not_read_in_part(crate):
+def test_a_description_with_too_many_entities_is_refused(crate):
     (crate / "fits.csv").unlink()
     others = 3  # that `describe` adds
     file = {"@type": "File", "@id": "fits.csv"}
