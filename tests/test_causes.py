@@ -62,7 +62,7 @@ CAUSES = {
     ("experiments/run/pose_walk.py", "Something pushed the foot"): (
         "the sensor's force less the foot's weight",
         "experiments/calibration/test_gravity.py::"
-        "test_a_hand_on_the_foot_refuses_the_calibration",
+        "test_a_calibration_with_a_hand_on_the_foot_is_refused",
     ),
     ("ft_sensor/calibration/fit.py", "has the opposite sign in the sensor"): (
         "the fitted mass is negative at the stated mounting",

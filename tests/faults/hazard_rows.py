@@ -888,7 +888,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "before the first torque; 1 N between the poses, 20 degrees about z",
             (
                 "tests/experiments/calibration/test_sensor.py::test_a_sensor_that_was_turned_since_its_calibration_is_refused",
-                "tests/experiments/calibration/test_sensor.py::test_a_foot_calibrated_with_another_foot_is_refused",
+                "tests/experiments/calibration/test_sensor.py::test_a_calibration_of_another_foot_is_refused",
             ),
         ),
         "late": (

@@ -1,4 +1,4 @@
-"""Calibrations of friction held against the truth of simulated arms."""
+"""Calibrations of friction compared with the truth of simulated arms."""
 
 import tomllib
 from collections.abc import Sequence
@@ -22,10 +22,10 @@ class CalibrationErrors:
     """Errors of one calibration by joint, shapes (7,).
 
     Attributes:
-        coulomb: relative.
-        asymmetry: as a share of Coulomb friction.
-        breakaway: relative, with its sign.
-        curve: largest relative one of the torque over 0.01 to 0.4 rad/s.
+        coulomb: relative error.
+        asymmetry: error as a share of Coulomb friction.
+        breakaway: signed relative error.
+        curve: largest relative error of the torque over 0.01 to 0.4 rad/s.
     """
 
     coulomb: np.ndarray
@@ -36,12 +36,12 @@ class CalibrationErrors:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """One bound, held against the calibrations of a share.
+    """One bound, compared with the calibrations of a share.
 
     Attributes:
-        name: what is bounded.
-        values: the worst of the seeds, or their median, by joint, shape (7,).
-        bounds: shape (7,).
+        name: bounded quantity.
+        values: worst value of the seeds, or their median, by joint, shape (7,).
+        bounds: upper bounds, shape (7,).
     """
 
     name: str
@@ -54,11 +54,11 @@ class Verdict:
 
 
 def errors_of(found: Path, true: Path) -> CalibrationErrors:
-    """Return the errors of a calibration.
+    """Errors of a calibration.
 
     Args:
-        found: the file of the calibration.
-        true: what the simulated arm really has.
+        found: file of the calibration.
+        true: file of the true friction of the simulated arm.
     """
     tables = [tomllib.loads(path.read_text()) for path in (found, true)]
     friction = [friction_of(table["motors"]) for table in tables]
@@ -78,7 +78,7 @@ def errors_of(found: Path, true: Path) -> CalibrationErrors:
 
 
 def verdicts(errors: Sequence[CalibrationErrors]) -> list[Verdict]:
-    """Return the bounds of one share; of break-away the median over seeds counts."""
+    """Verdicts on one share; for break-away the median over seeds counts."""
     broken = np.median([np.abs(each.breakaway) for each in errors], axis=0)
     worst = {
         name: np.max([getattr(each, name) for each in errors], axis=0)

@@ -1,4 +1,4 @@
-"""What every guided calibration has in common."""
+"""A guided calibration shows its fit and writes a file unless the fit is refused."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -61,7 +61,7 @@ def context(*, simulation=None, is_forced=False):
     return CalibrationContext(loop, is_forced=is_forced)
 
 
-def test_what_was_fitted_is_shown_and_written_with_its_use(tmp_path):
+def test_a_fit_is_shown_and_written_with_its_use(tmp_path):
     out, seen = tmp_path / "mean.toml", context()
     calibrate(MEAN, seen, out)
     assert out.read_text() == "mean = 1.5\n"
@@ -70,7 +70,7 @@ def test_what_was_fitted_is_shown_and_written_with_its_use(tmp_path):
     assert list(tmp_path.iterdir()) == [out]
 
 
-def test_what_is_refused_is_shown_and_not_written(tmp_path):
+def test_a_refused_fit_is_shown_and_not_written(tmp_path):
     out, seen = tmp_path / "mean.toml", context()
     with pytest.raises(SettingsError, match="8 is more than 3"):
         calibrate(TOO_MUCH, seen, out)
@@ -78,18 +78,18 @@ def test_what_is_refused_is_shown_and_not_written(tmp_path):
     assert not out.exists()
 
 
-def test_what_is_refused_is_written_when_a_person_forces_it(tmp_path):
+def test_a_refused_fit_is_written_if_forced(tmp_path):
     out = tmp_path / "mean.toml"
     calibrate(TOO_MUCH, context(is_forced=True), out)
     assert out.read_text() == "mean = 8\n"
 
 
-def test_what_is_true_of_a_simulated_arm_stands_beside_its_calibration(tmp_path):
+def test_the_truth_of_a_simulated_arm_is_written_next_to_its_calibration(tmp_path):
     out, seen = tmp_path / "mean.fake.toml", context(simulation=object())
     calibrate(MEAN, seen, out)
-    beside = tmp_path / "mean.truth.toml"
-    assert beside.read_text() == "mean = 1.4\n"
-    assert seen.console.lines[-1] == f"True mean of the simulated arm: {beside}."
+    truth_path = tmp_path / "mean.truth.toml"
+    assert truth_path.read_text() == "mean = 1.4\n"
+    assert seen.console.lines[-1] == f"True mean of the simulated arm: {truth_path}."
     assert set(tmp_path.iterdir()) == set(MEAN.files(out, is_fake=True))
     assert MEAN.files(out, is_fake=False) == [out]
 

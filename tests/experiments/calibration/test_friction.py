@@ -22,7 +22,7 @@ pytestmark = [pytest.mark.long, pytest.mark.timeout(600)]
 
 
 def calibrate(out, *options, press=None, is_quick=True):
-    """Calibrate a simulated arm; return what was said and the simulated rigs.
+    """Calibrate a simulated arm; the result of the command and the simulated rigs.
 
     Quick: around two poses instead of three, with one step of the plant per cycle.
     `press(asked, rig)` is called at every look at the keys.
@@ -53,7 +53,7 @@ def calibrate(out, *options, press=None, is_quick=True):
 
 
 def read(folder):
-    """Return what was identified and what is true, as tables."""
+    """Identified and true friction, as tables."""
     names = ("friction.toml", "friction.truth.toml")
     return [tomllib.loads((folder / name).read_text()) for name in names]
 
@@ -64,7 +64,7 @@ def errors(folder):
 
 @pytest.fixture(scope="module")
 def calibrated(tmp_path_factory):
-    """Return (what was said, folder, simulated rig) of one calibration."""
+    """(result of the command, folder, simulated rig) of one calibration."""
     folder = tmp_path_factory.mktemp("calibrated")
     out = folder / "friction.toml"
     done, made = calibrate(out, "--friction", 0.4, "--seed", 3)
@@ -95,7 +95,7 @@ def test_the_operator_sees_the_friction_of_every_joint(calibrated):
     assert done.out.rstrip().endswith("ARM: idle; it sinks slowly, support it.")
 
 
-def test_the_file_says_where_it_is_from(calibrated):
+def test_the_file_states_foot_gravity_and_lower_bounds(calibrated):
     found, _ = read(calibrated[1])
     assert (found["foot"], found["gravity"]) == ("tread", "cad")
     assert found["is_simulated"] is True
@@ -105,7 +105,9 @@ def test_the_file_says_where_it_is_from(calibrated):
 
 
 @pytest.mark.parametrize("seconds", [0.5, 3.0])
-def test_ctrl_c_on_the_way_writes_nothing_and_leaves_the_arm_idle(tmp_path, seconds):
+def test_ctrl_c_during_the_motion_writes_nothing_and_leaves_the_arm_idle(
+    tmp_path, seconds
+):
     def press(asked, rig):
         if asked.prompt is Prompt.MOVING and asked.since > seconds:
             signal.raise_signal(signal.SIGINT)
@@ -138,7 +140,7 @@ def test_no_file_is_ever_overwritten(tmp_path, name):
     assert (tmp_path / name).read_text() == "mine"
 
 
-def test_a_silly_share_of_friction_is_refused(tmp_path):
+def test_a_share_of_friction_out_of_range_is_refused(tmp_path):
     done, made = calibrate(tmp_path / "friction.toml", "--friction", 3)
     assert done.code == 2
     assert "--friction" in done.err
@@ -148,7 +150,7 @@ def test_a_silly_share_of_friction_is_refused(tmp_path):
 @pytest.mark.long
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("share", SHARES)
-def test_five_drawn_arms_are_identified_at_every_share(tmp_path, share):
+def test_drawn_arms_are_identified_at_every_share_of_friction(tmp_path, share):
     found = []
     for seed in SEEDS:
         folder = tmp_path / str(seed)

@@ -26,7 +26,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 
 
 def perturbed(constants):
-    """Return an arm whose links weigh up to a quarter more or less, elsewhere."""
+    """An arm whose links weigh up to a quarter more or less, with shifted centres."""
     rng = np.random.default_rng(3)
     links = tuple(
         Body(
@@ -40,7 +40,7 @@ def perturbed(constants):
 
 
 class HeavierRig(plain_world.FakeRig):
-    """A rig whose arm weighs otherwise than the drawings say."""
+    """A rig whose arm weighs otherwise than its drawings state."""
 
     made: ClassVar[list["HeavierRig"]] = []
 
@@ -53,10 +53,10 @@ class HeavierRig(plain_world.FakeRig):
 
 
 def calibrate(out, *options, press=None, is_quick=True):
-    """Calibrate a simulated arm; return what was said and the simulated rig.
+    """Calibrate a simulated arm; the result of the command and the simulated rig.
 
-    `press(asked, rig)` is called at every look at the keys. Quick: the arm is faster,
-    goes less far and stops for a shorter time than a real one may.
+    `press(asked, rig)` is called at every look at the keys. Quick: the arm moves
+    faster and less far, and stops for a shorter time, than a real one may.
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(plain_world, "FakeRig", HeavierRig)
@@ -79,7 +79,7 @@ def calibrate(out, *options, press=None, is_quick=True):
 
 
 def errors(text, rig):
-    """Return rms errors of torque [N m] with and without calibration, 50 poses."""
+    """RMS errors of torque [N m] with and without calibration, over 50 poses."""
     found = gravity_from_toml(text, "gravity.toml")
     constants = load_constants()
     rng = np.random.default_rng(5)
@@ -92,14 +92,14 @@ def errors(text, rig):
 
 @pytest.fixture(scope="module")
 def calibrated(tmp_path_factory):
-    """Return (what was said, text of the file, simulated rig) of one calibration."""
+    """(result of the command, text of the file, simulated rig) of one calibration."""
     out = tmp_path_factory.mktemp("calibrated") / "gravity.toml"
     done, rig = calibrate(out, "--poses", 3)
     assert done.code == 0, done.err
     return done, out.read_text(), rig
 
 
-def test_torques_of_a_perturbed_arm_are_recovered_where_nothing_was_measured(
+def test_torques_of_a_perturbed_arm_are_recovered_in_poses_not_measured(
     calibrated,
 ):
     with_it, without = errors(*calibrated[1:])
@@ -108,7 +108,7 @@ def test_torques_of_a_perturbed_arm_are_recovered_where_nothing_was_measured(
 
 
 @pytest.mark.long
-def test_the_whole_calibration_recovers_the_torques_at_its_own_pace(tmp_path):
+def test_the_calibration_at_full_length_recovers_the_torques(tmp_path):
     out = tmp_path / "gravity.toml"
     done, rig = calibrate(out, is_quick=False)
     assert done.code == 0, done.err
@@ -116,10 +116,10 @@ def test_the_whole_calibration_recovers_the_torques_at_its_own_pace(tmp_path):
 
 
 @pytest.mark.long
-def test_an_arm_with_all_the_friction_that_was_identified_is_not_taken_for_stuck(
+def test_an_arm_with_full_friction_is_not_taken_for_stuck(
     tmp_path,
 ):
-    """Its motors start at up to 1.4 of it while other joints swing theirs."""
+    """Its motors start at up to 1.4 of the friction while other joints swing."""
     arm = ("--friction", "1.0", "--seed", "1", "--fake", "--fast")
     out = ("--to", tmp_path / "gravity.toml", "--data", tmp_path)
     done = traction("calibrate", "gravity", "--force", *arm, *out)
@@ -127,7 +127,7 @@ def test_an_arm_with_all_the_friction_that_was_identified_is_not_taken_for_stuck
     assert (tmp_path / "gravity.toml").is_file()
 
 
-def test_the_person_is_told_to_clear_the_space_and_sees_the_residuals(calibrated):
+def test_the_operator_is_asked_to_clear_the_space_and_sees_the_rank(calibrated):
     done, _, _ = calibrated
     assert "clear the space" in done.out
     assert "rank 12 of 12" in done.out
@@ -135,7 +135,7 @@ def test_the_person_is_told_to_clear_the_space_and_sees_the_residuals(calibrated
     assert done.out.rstrip().endswith("ARM: idle; it sinks slowly, support it.")
 
 
-def test_the_hand_is_off_the_arm_while_it_is_weighed(tmp_path):
+def test_the_simulated_hand_is_off_the_arm_during_the_motion(tmp_path):
     hands = []
 
     def press(asked, rig):
@@ -147,7 +147,7 @@ def test_the_hand_is_off_the_arm_while_it_is_weighed(tmp_path):
     assert hands == [False]
 
 
-def test_ctrl_c_on_the_way_writes_nothing_and_leaves_the_arm_idle(tmp_path):
+def test_ctrl_c_during_the_motion_writes_nothing_and_leaves_the_arm_idle(tmp_path):
     speeds = []
 
     def press(asked, rig):
@@ -164,10 +164,8 @@ def test_ctrl_c_on_the_way_writes_nothing_and_leaves_the_arm_idle(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_an_arm_that_is_held_while_it_is_weighed_is_no_measurement(
-    tmp_path, monkeypatch
-):
-    """It is held at rest only: in a move it would be a motor that turns in vain."""
+def test_an_arm_that_is_disturbed_while_it_is_weighed_is_refused(tmp_path, monkeypatch):
+    """The arm is pressed at rest only: in a move its motor would count as stuck."""
     resting = []
     rest = walk.PoseWalk.rest
 
@@ -215,7 +213,7 @@ def test_a_missing_calibration_is_named(tmp_path):
     ],
     ids=["gravity", "friction"],
 )
-def test_gravity_is_weighed_though_rig_toml_wants_a_calibration(tmp_path, use):
+def test_gravity_is_calibrated_before_the_files_of_rig_toml_exist(tmp_path, use):
     config = write_config(tmp_path, rig=use)
 
     def press(asked, rig):
@@ -225,7 +223,7 @@ def test_gravity_is_weighed_though_rig_toml_wants_a_calibration(tmp_path, use):
     assert done.code == 130
 
 
-def test_a_simulated_calibration_is_marked_and_lies_beside_rig_toml(tmp_path):
+def test_a_simulated_calibration_goes_to_a_marked_file_next_to_rig_toml(tmp_path):
     config = write_config(tmp_path)
     (tmp_path / "gravity.fake.toml").write_text("mine")
     done = traction("calibrate", "gravity", "--fake", "--fast", "--config", config)
@@ -242,7 +240,7 @@ def test_a_file_is_never_overwritten(tmp_path):
     assert out.read_text() == "mine"
 
 
-def test_a_folder_that_is_not_there_is_refused_before_the_arm_moves(tmp_path):
+def test_a_missing_folder_is_refused_before_the_arm_moves(tmp_path):
     out = tmp_path / "nowhere" / "gravity.toml"
     done = traction("calibrate", "gravity", "--fake", "--fast", "--to", out)
     assert done.code == 2
@@ -250,21 +248,21 @@ def test_a_folder_that_is_not_there_is_refused_before_the_arm_moves(tmp_path):
 
 
 @pytest.mark.parametrize("poses", [2, 61])
-def test_a_silly_number_of_poses_is_refused(poses):
+def test_a_number_of_poses_out_of_range_is_refused(poses):
     done = traction("calibrate", "gravity", "--fake", "--fast", "--poses", poses)
     assert done.code == 2
     assert "expected a whole number 3..60" in done.err
 
 
 @pytest.mark.parametrize("option", [("--fast",), ("--operator-script", "auto")])
-def test_what_belongs_to_a_simulation_is_refused_on_the_real_arm(option):
+def test_options_of_a_simulation_are_refused_on_the_real_arm(option):
     done = traction("calibrate", "gravity", *option)
     assert done.code == 2
     assert "only with --fake" in done.err
 
 
 def test_an_arm_that_was_zeroed_elsewhere_is_refused_with_the_joint(tmp_path):
-    """Its encoders tell a joint 2 that is 5 degrees from where it truly is."""
+    """Its encoders report joint 2 five degrees from its true position."""
     out, usual = tmp_path / "gravity.toml", ArmPlant.counts
     per_joint = np.array(load_constants().j2mp)[:, 1] * 4096 / (2 * np.pi)
     shift = np.round(np.radians(-5.0) * per_joint).astype(int)
@@ -281,14 +279,14 @@ def test_an_arm_that_was_zeroed_elsewhere_is_refused_with_the_joint(tmp_path):
     assert not out.exists()
 
 
-def test_how_well_the_zero_is_known_is_told(calibrated):
+def test_the_estimate_of_zero_errors_is_printed(calibrated):
     rows = calibrated[0].out.splitlines()
     (line,) = [row for row in rows if "zero errors estimated" in row]
     assert "joint 2" in line
     assert "1, 6 and 7 are not observable" in line
 
 
-def test_a_hand_on_the_foot_refuses_the_calibration(tmp_path):
+def test_a_calibration_with_a_hand_on_the_foot_is_refused(tmp_path):
     """Somebody leans on the foot from the second pose on; the torques look perfect."""
     lean = (0.0, 3.0, -4.0)  # N
 

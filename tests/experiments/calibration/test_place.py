@@ -1,4 +1,4 @@
-"""traction teach: a place from touches of both ends of a container."""
+"""`traction teach` measures a place from touches of both ends of a container."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def taught(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_both_ends_give_the_place(taught):
+def test_touches_of_both_ends_give_the_place(taught):
     folder, done = taught
     found = TaughtPlace.parse((folder / "place_bay.fake.toml").read_text())
     assert (found.place, found.foot, found.simulated) == ("bay", "tread", True)
@@ -48,7 +48,7 @@ def test_both_ends_give_the_place(taught):
 
 
 @pytest.mark.slow
-def test_a_taught_place_is_where_a_cell_stands(taught, tmp_path):
+def test_a_cell_takes_its_numbers_from_a_taught_place(taught, tmp_path):
     folder, _ = taught
     shipped = load_settings(None).rig_text
     name = "place_bay.fake.toml"
@@ -72,7 +72,7 @@ def test_a_taught_place_is_where_a_cell_stands(taught, tmp_path):
         load_settings(config)
 
 
-def test_what_cannot_be_taught_is_refused_before_anything_starts(tmp_path):
+def test_an_invalid_place_or_foot_is_refused_before_anything_starts(tmp_path):
     config = write_config(tmp_path)
     options = (*QUICK, "--config", config, "--data", tmp_path)
     for words, cause in (
@@ -84,7 +84,7 @@ def test_what_cannot_be_taught_is_refused_before_anything_starts(tmp_path):
         assert cause in done.err
 
 
-def test_touches_of_one_end_that_lie_apart_are_refused():
+def test_scattered_touches_of_one_end_are_refused():
     near = [EndTouch(np.array([0.2, 0.0, 0.1]), np.zeros(7))] * 3
     far = [
         EndTouch(np.array([0.6 + 0.02 * k, 0.0, 0.1]), np.zeros(7)) for k in range(3)

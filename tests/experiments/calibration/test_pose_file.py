@@ -1,4 +1,4 @@
-"""Poses that a person has chosen are read and checked before anything moves."""
+"""Poses of a file are read and checked before the arm moves."""
 
 from pathlib import Path
 
@@ -29,9 +29,9 @@ def listed(folder, poses):
     return path
 
 
-def test_safe_poses_of_a_person_are_taken_as_they_are(tmp_path):
-    found = read_poses(listed(tmp_path, SAFE), SETTINGS, ROW, ANY)
-    assert np.array(found).tolist() == np.array(SAFE, dtype=float).tolist()
+def test_safe_poses_are_taken_unchanged(tmp_path):
+    poses = read_poses(listed(tmp_path, SAFE), SETTINGS, ROW, ANY)
+    assert np.array(poses).tolist() == np.array(SAFE, dtype=float).tolist()
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_a_file_without_poses_is_refused(tmp_path, text):
         read_poses(path, SETTINGS, ROW, ANY)
 
 
-def test_too_few_poses_and_a_terrain_take_none(tmp_path):
+def test_too_few_poses_are_refused_by_gravity_and_terrain(tmp_path):
     path = listed(tmp_path, SAFE[:2])
     config = write_config(tmp_path)
     for what in ("gravity", "terrain"):
@@ -89,8 +89,8 @@ def test_too_few_poses_and_a_terrain_take_none(tmp_path):
 
 
 @pytest.mark.parametrize("count", [2, 61, 30_000])
-def test_poses_are_counted_before_any_is_looked_at(tmp_path, count):
-    """Poses that would be refused for what they are; in a file of under 1 MB."""
+def test_poses_are_counted_before_any_is_checked(tmp_path, count):
+    """The poses themselves are invalid too; the file has less than 1 MB."""
     path = tmp_path / "poses.toml"
     path.write_text(f"poses = [{'[9,9,9,9,9,9,9],' * count}]")
     with pytest.raises(SettingsError, match=rf"{count} poses - expected 3\.\.60"):

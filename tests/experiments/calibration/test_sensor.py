@@ -40,9 +40,9 @@ MASS, COM, ANGLE = 0.62, np.array([0.014, -0.006, 0.055]), np.radians(25.0)
 
 
 class OtherRig(plain_world.FakeRig):
-    """A rig whose sensor is turned and whose foot weighs otherwise than rig.toml says.
+    """A rig whose sensor is turned and whose foot weighs otherwise than in rig.toml.
 
-    The sensor reads the reaction, too.
+    The sensor also reads the reaction force.
     """
 
     is_in_the_air = True
@@ -57,7 +57,7 @@ class OtherRig(plain_world.FakeRig):
 
 
 class SteadyErrors(SensorErrors):
-    """A sensor that hardly drifts: what is left are the errors of the method."""
+    """A sensor that hardly drifts: the errors of the method remain."""
 
     def __init__(self, rng):
         super().__init__(rng, *(_drifting(s, 0.02) for s in (FORCE, TORQUE)))
@@ -88,7 +88,7 @@ def calibrate(what, folder, *options, rig=OtherRig, errors=SensorErrors):
 
 @pytest.fixture(scope="module")
 def calibrated(tmp_path_factory):
-    """Return (what was said, file) of a calibration of another foot, turned sensor."""
+    """(result of the command, file) of a calibration of another foot, turned sensor."""
     folder = tmp_path_factory.mktemp("sensor")
     out = folder / "ft_sensor.toml"
     options = ("--poses", 6, "--to", out)
@@ -97,7 +97,7 @@ def calibrated(tmp_path_factory):
     return done, out
 
 
-def test_six_orientations_recover_payload_mounting_and_sign(calibrated):
+def test_a_few_orientations_recover_payload_mounting_and_sign(calibrated):
     _, out = calibrated
     found = sensor_from_toml(out.read_text(), out.name)
     assert found.fit.mass == pytest.approx(MASS, abs=0.005)
@@ -118,19 +118,19 @@ def test_a_sensor_with_its_usual_drift_is_calibrated(tmp_path):
     assert fit.mass == pytest.approx(MASS, abs=0.03)
 
 
-def test_the_person_sees_what_was_found_and_how_to_use_it(calibrated):
+def test_the_operator_sees_the_mounting_and_how_to_use_the_file(calibrated):
     done, out = calibrated
     assert "degrees about z7, sign -1" in done.out
     assert f'calibration = "{out.name}" in [ft_sensor] of rig.toml' in done.out
     assert done.out.rstrip().endswith("ARM: idle; it sinks slowly, support it.")
 
 
-def test_a_calibration_survives_its_file(calibrated):
+def test_a_calibration_is_written_as_it_is_read(calibrated):
     text = calibrated[1].read_text()
     assert sensor_to_toml(sensor_from_toml(text, "a.toml")) == text
 
 
-def test_a_calibrated_foot_turned_through_the_air_reads_nothing(calibrated):
+def test_a_calibrated_foot_turned_in_the_air_shows_no_force(calibrated):
     found = sensor_from_toml(calibrated[1].read_text(), "ft_sensor.toml")
     truth = payload_of(Tool(Body(0.1, COM, np.eye(3)), *_foot_and_sole()))
     fitted = payload_of(
@@ -152,7 +152,7 @@ def test_a_calibrated_foot_turned_through_the_air_reads_nothing(calibrated):
     assert np.linalg.norm(left, axis=1).max() < 0.3
 
 
-def test_tared_at_one_angle_only_an_incline_shows_as_force():
+def test_an_incline_shows_as_a_force_after_a_tare_at_one_angle():
     """Why the calibration exists: 10 degrees with 0.45 kg are 0.77 N."""
     payload = payload_of(
         Tool(Body(0.1, COM, np.eye(3)), Body(0.45, np.zeros(3), np.eye(3)), np.zeros(3))
@@ -165,7 +165,7 @@ def test_tared_at_one_angle_only_an_incline_shows_as_force():
 
 
 @pytest.mark.long
-def test_drift_is_told_and_refused_unless_forced(tmp_path):
+def test_drift_is_reported_and_refused_unless_forced(tmp_path):
     out = tmp_path / "ft_sensor.toml"
     options = ("--poses", 6, "--to", out)
     done = calibrate("sensor", tmp_path, *options, errors=DriftingErrors)
@@ -179,7 +179,7 @@ def test_drift_is_told_and_refused_unless_forced(tmp_path):
 
 
 def record_with(folder, calibrated, angle=ANGLE, sign=-1.0):
-    """Record a trial with the calibration on a sensor that is mounted like this."""
+    """Record a trial with the calibration and a sensor of this `angle` and `sign`."""
     (folder / "ft_sensor.toml").write_text(calibrated[1].read_text())
     change = ("sign = 1 ", 'calibration = "ft_sensor.toml"\nsign = 1 ')
     config = write_config(folder, rig=change)
@@ -214,7 +214,9 @@ def test_a_sensor_that_was_turned_since_its_calibration_is_refused(
     assert not list((tmp_path / "data").rglob("*.mcap"))
 
 
-def test_a_sensor_whose_sign_was_changed_since_is_refused(tmp_path, calibrated):
+def test_a_sensor_whose_sign_changed_since_its_calibration_is_refused(
+    tmp_path, calibrated
+):
     done = record_with(tmp_path, calibrated, sign=1.0)
     assert done.code == 3
     assert "traction calibrate sensor" in done.err
@@ -237,7 +239,7 @@ def test_a_simulated_calibration_is_refused_on_the_real_rig(tmp_path, calibrated
         with_calibrations(settings, is_simulated=False)
 
 
-def test_a_foot_calibrated_with_another_foot_is_refused(tmp_path, calibrated):
+def test_a_calibration_of_another_foot_is_refused(tmp_path, calibrated):
     (tmp_path / "foot.toml").write_text(calibrated[1].read_text())
     change = ("[feet.bare]\n", '[feet.bare]\ncalibration = "foot.toml"\n')
     settings = load_settings(write_config(tmp_path, rig=change))
@@ -246,7 +248,7 @@ def test_a_foot_calibrated_with_another_foot_is_refused(tmp_path, calibrated):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "cause"),
     [
         ("", "states no version"),
         ('version = "1.0"\n', "is missing"),
@@ -254,8 +256,8 @@ def test_a_foot_calibrated_with_another_foot_is_refused(tmp_path, calibrated):
         ("x = [" * 3000, "not a calibration of a wrist sensor"),
     ],
 )
-def test_a_file_that_is_no_calibration_is_named(text, said):
-    with pytest.raises(SettingsError, match=said):
+def test_an_invalid_calibration_file_is_named(text, cause):
+    with pytest.raises(SettingsError, match=cause):
         sensor_from_toml(text, "ft_sensor.toml")
 
 
@@ -274,7 +276,7 @@ def test_a_missing_calibration_is_named_with_what_to_do(tmp_path):
 def touch(folder, terrain, *options):
     """Touch the four corners of a short container, faster than a real arm can follow.
 
-    So it hardly rubs.
+    Hence its low friction.
     """
     out = folder / f"terrain_{terrain}.toml"
     config = write_config(folder, travel=0.2)
@@ -304,14 +306,14 @@ def test_a_touched_plate_gives_incline_and_heading(tmp_path):
 
 
 class TiltedRig(plain_world.FakeRig):
-    """A rig whose container is two degrees steeper than the matrix says."""
+    """A rig whose container is two degrees steeper than the matrix states."""
 
     def __init__(self, scene, *rest, **options):
         frame = replace(scene.frame, incline=scene.frame.incline + np.radians(2.0))
         super().__init__(replace(scene, frame=frame), *rest, **options)
 
 
-def test_a_container_that_is_inclined_otherwise_is_refused(tmp_path):
+def test_a_container_with_another_incline_is_refused(tmp_path):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(plain_world, "FakeRig", TiltedRig)
         done, out = touch(tmp_path, "S10")
@@ -321,7 +323,7 @@ def test_a_container_that_is_inclined_otherwise_is_refused(tmp_path):
         assert not out.exists()
 
 
-def test_a_session_starts_where_the_container_was_touched(tmp_path):
+def test_a_calibrated_container_replaces_the_numbers_of_its_row(tmp_path):
     config = write_config(tmp_path, travel=0.2)
     row = load_settings(config).row("TF")
     frame = TerrainFrame(0.0, 0.02, (0.705, 0.001, 0.121), row.travel)
@@ -346,7 +348,7 @@ def _settings_with(folder, calibrated):
 
 
 def force_error(path):
-    """Return the mean absolute error of F_n in a simulated trial [N]."""
+    """Mean absolute error of F_n in a simulated trial [N]."""
     measured = TrialReader(path).cycles().data
     truth = TrialReader(path.with_name("T01.truth.mcap")).truth().data
     t_ns = truth["host_ns"].astype(float)

@@ -1,4 +1,4 @@
-"""A calibration whose console freezes while the arm moves by itself."""
+"""The arm stops if the console freezes during a move of a calibration."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ FROZEN_FOR = 3.7  # s
 
 
 class FrozenConsole:
-    """Beats no more from the middle of a move on; the arm is watched meanwhile."""
+    """Stops its heartbeat in the middle of a move, and records the arm meanwhile."""
 
     def __init__(self, patch):
         self.built = watch_builds(patch)
@@ -39,7 +39,7 @@ class FrozenConsole:
         patch.setattr(AutoOperator, "answer", answer)
 
     def freeze(self):
-        """Let time pass without the console."""
+        """Let time pass without the heartbeat of the console."""
         if self.is_frozen:
             return
         self.is_frozen = True
@@ -54,7 +54,7 @@ class FrozenConsole:
 
 @pytest.fixture(scope="module")
 def frozen(tmp_path_factory):
-    """Return (console, how the calibration ended)."""
+    """(console, result of the calibration)."""
     out = tmp_path_factory.mktemp("frozen") / "gravity.toml"
     with pytest.MonkeyPatch.context() as patch:
         console = FrozenConsole(patch)
@@ -62,7 +62,7 @@ def frozen(tmp_path_factory):
     return console, done
 
 
-def test_the_arm_stands_as_soon_as_the_console_counts_as_silent(frozen):
+def test_the_arm_stops_as_soon_as_the_console_counts_as_silent(frozen):
     console, _ = frozen
     assert console.speed > 0.1  # it was moving
     q = np.array(console.q)
@@ -73,7 +73,7 @@ def test_the_arm_stands_as_soon_as_the_console_counts_as_silent(frozen):
     assert np.ptp(q[-50:], axis=0).max() < 2e-3
 
 
-def test_whoever_asked_for_the_move_hears_that_it_was_stopped_and_why(frozen):
+def test_the_command_reports_the_stopped_move_and_its_cause(frozen):
     console, done = frozen
     assert done.code == 4
     assert "0.5 s" in done.err
@@ -82,7 +82,7 @@ def test_whoever_asked_for_the_move_hears_that_it_was_stopped_and_why(frozen):
     assert console.built.rigs[-1].network.safety_mode is SafetyMode.IDLE
 
 
-def test_the_calibration_is_what_goes_on_and_no_session(frozen):
+def test_the_message_names_the_calibration_to_repeat_and_no_session(frozen):
     _, done = frozen
     assert "run: traction calibrate gravity." in done.err
     assert "resume" not in done.err
