@@ -1,4 +1,4 @@
-"""What the program builds for a session, kept hold of for tests."""
+"""Records the parts that the program builds for a session."""
 
 from dataclasses import dataclass, field
 
@@ -15,14 +15,14 @@ from fakes.world.rig import FakeRig
 
 @dataclass(slots=True)
 class Built:
-    """Everything that was built, oldest first; the public constructors are watched.
+    """Everything that was built, oldest first; public constructors are watched.
 
     Attributes:
         rigs: the simulated rigs.
-        clocks: of the simulated rigs.
-        backends: those of this process.
-        cycles: the work of their loops; `cycles[-1].status` is what the arm does.
-        loop_servers: what runs around the cycles.
+        clocks: clocks of the simulated rigs.
+        backends: backends of this process.
+        cycles: cycles of their loops; `cycles[-1].status` is the state of the arm.
+        loop_servers: servers that run the cycles.
     """
 
     rigs: list[FakeRig] = field(default_factory=list)
@@ -48,7 +48,7 @@ class Built:
         return self.cycles[-1]
 
     def forget(self) -> None:
-        """Let go of everything."""
+        """Drop all references."""
         for built in (
             self.rigs,
             self.clocks,
@@ -60,7 +60,7 @@ class Built:
 
 
 def watch_builds(patch: pytest.MonkeyPatch) -> Built:
-    """Return what will be built while `patch` lasts."""
+    """Everything that is built while `patch` lasts."""
     built = Built()
 
     class SeenRig(plain_world.FakeRig):

@@ -28,9 +28,9 @@ SETTINGS = ONE_THREAD | {"OPENBLAS_CORETYPE": "Haswell"}
 
 
 def processor() -> str:
-    """Return whose kernels the linear algebra library takes.
+    """Processor whose kernels the linear algebra library uses.
 
-    Those of another processor round differently, so digests hold for one kind.
+    Kernels of another processor round differently, so digests hold for one kind.
     """
     import numpy as np
 
@@ -40,7 +40,7 @@ def processor() -> str:
 
 
 def digest_of(path: Path) -> str:
-    """Return the SHA-256 of every /cycle payload of a trial file, in order."""
+    """SHA-256 of all /cycle payloads of a trial file, in order."""
     digest = hashlib.sha256()
     with path.open("rb") as file:
         for _, _, message in make_reader(file).iter_messages(topics=["/cycle"]):
@@ -49,12 +49,12 @@ def digest_of(path: Path) -> str:
 
 
 def digests_of(session: Path) -> dict[str, str]:
-    """Return the digest of every trial of a session folder."""
+    """Digest of every trial of a session folder."""
     return {name: digest_of(session / "trials" / f"{name}.mcap") for name in TRIALS}
 
 
 def record(folder: Path) -> Path:
-    """Record the session whose digests are kept; return its folder."""
+    """Record the session whose digests are kept; its folder."""
     config = write_config(folder, travel=TRAVEL)
     script = folder / "script"
     script.write_text("keep\nlast\nkeep\n")
@@ -65,20 +65,20 @@ def record(folder: Path) -> Path:
 
 
 def main() -> None:
-    """Write the digests of the simulation anew, or tell those of this process."""
+    """Write the digests of the simulation anew, or print those of this process."""
     if len(sys.argv) > 1:
-        found = {
+        result = {
             "processor": processor(),
             "digests": digests_of(record(Path(sys.argv[1]))),
         }
-        sys.stdout.write(json.dumps(found) + "\n")
+        sys.stdout.write(json.dumps(result) + "\n")
         return
     with tempfile.TemporaryDirectory() as folder:
         KEPT.write_text(json.dumps(digests_in_process(Path(folder)), indent=1) + "\n")
 
 
 def digests_in_process(folder: Path) -> dict[str, Any]:
-    """Record in a process that has the kernels; return what it tells."""
+    """Processor and digests of a recording in a process with the fixed kernels."""
     command = [sys.executable, "-m", "tests.experiments.cycle_digest", folder]
     environment = os.environ | SETTINGS
     done = subprocess.run(command, env=environment, capture_output=True, check=True)

@@ -1,16 +1,16 @@
-"""The catalogue of messages, as it is seen on the screen."""
+"""The catalogue of messages, as patterns of what the screen shows."""
 
 import re
 from string import Formatter
 
 from experiments.messages import CATALOGUE
 
-# Asked at a prompt that is not there without a terminal; the hint takes its place.
+# Messages whose prompt needs a terminal; without one a hint takes its place.
 NO_KEYS = {"crash", "mismatch", "unfinished"}
 
 
 def pattern(name):
-    """Return what the catalogue says as a regular expression, anything filled in."""
+    """Regular expression of a message of the catalogue with any values filled in."""
     message = CATALOGUE[name]
     arm = f"ARM: {message.arm}." if message.arm else ""
     do = "" if name in NO_KEYS else message.do

@@ -5,7 +5,7 @@ from fakes.world import plain_world
 
 
 def serve(monkeypatch, options=None, prepare=None):
-    """Let every simulated rig have the network `options`, and what `prepare` does."""
+    """Give every simulated rig the network `options`, changed by `prepare`."""
 
     class OtherRig(plain_world.FakeRig):
         def __init__(self, *arguments, **named):
@@ -17,13 +17,13 @@ def serve(monkeypatch, options=None, prepare=None):
 
 
 def firmware(motor, safety=None):
-    """Return the options of an arm of one generation."""
+    """Network options of an arm of one firmware generation."""
     safety = motor if safety is None else safety
     return NetworkOptions(vers=(motor,) * 7, safety_vers=safety, monitor_vers=3)
 
 
 def deaf_to(*requests):
-    """Return what lets a network lose (identifier, first byte) on their way to it."""
+    """A `prepare` that makes a network lose requests of (identifier, first byte)."""
 
     def prepare(network):
         receive = network.receive

@@ -1,4 +1,4 @@
-"""The program as a person meets it: arguments in, exit code and texts out."""
+"""The program as a user runs it: arguments in, exit code and texts out."""
 
 import contextlib
 import hashlib
@@ -22,7 +22,7 @@ TRAVEL = 0.07  # m, a container that is crossed in a few seconds
 
 @dataclass(frozen=True)
 class Done:
-    """How a command ended, and what it said."""
+    """How a command ended, and what it printed."""
 
     code: int
     out: str
@@ -47,13 +47,13 @@ def run_short(config, data, terrain="TF", trials=1, *more) -> Done:
 
 
 def changed(text: str, old: str, new: str) -> str:
-    """Return `text` with its first `old` replaced, which must be there."""
+    """`text` with its first `old` replaced; `old` must be there."""
     assert old in text
     return text.replace(old, new, 1)
 
 
 def write_config(folder: Path, *, rig=None, matrix=None, travel=TRAVEL) -> Path:
-    """Write rig.toml and matrix.toml, changed by (old, new), and return the first."""
+    """Write rig.toml and matrix.toml, changed by (old, new); the path of rig.toml."""
     shipped = resources.files("experiments.data")
     for name, change in (("rig.toml", rig), ("matrix.toml", matrix)):
         text = (shipped / name).read_text()
@@ -73,7 +73,7 @@ def served_config(folder):
 
 
 def only_session(data: Path) -> Path:
-    """Return the folder of the one session below `data`."""
+    """The folder of the one session below `data`."""
     (folder,) = [path for path in (data / "sessions").iterdir() if path.is_dir()]
     return folder
 
@@ -101,9 +101,9 @@ class Watched:
 
 
 def run_watched(config, data, *arguments, press=None):
-    """Run a session and keep hold of the simulated rig.
+    """Run a session and keep its simulated rig.
 
-    `press(asked, rig)` returns the key pressed, or None to leave it to AutoOperator.
+    `press(asked, rig)` gives the key pressed, or None to leave it to AutoOperator.
     """
     with pytest.MonkeyPatch.context() as patch:
         built = watch_builds(patch)
@@ -120,9 +120,9 @@ def run_watched(config, data, *arguments, press=None):
 
 
 def run_killed(config, data, *arguments, press):
-    """Run a session in a copy of this process, which `press` kills; return its folder.
+    """Run a session in a fork that `press` kills; the folder of the session.
 
-    What a kill leaves is on the disk then, and nothing has been tidied up.
+    The disk is as the kill left it; nothing has been recovered.
     """
     child = os.fork()
     if child == 0:
@@ -140,6 +140,6 @@ def kill_this_process():
 
 
 def kept_and_sound(folder):
-    """Return the names of the kept trials that are what their sidecars say."""
+    """Names of the kept trials with the checksum that their sidecar states."""
     paths = sorted((folder / "trials").glob("T??.mcap"))
     return [p.stem for p in paths if sidecar(p)["sha256"] == digest(p)]

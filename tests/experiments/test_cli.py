@@ -34,7 +34,7 @@ def test_help_of_the_program_names_every_command():
 
 
 @pytest.mark.parametrize("arguments", [("fly",), ("run",), ("fit", "a.csv")])
-def test_what_is_no_command_is_a_usage_error(arguments):
+def test_an_invalid_command_line_is_a_usage_error(arguments):
     done = traction(*arguments)
     assert done.code == 2
     assert "usage: traction" in done.err
@@ -72,24 +72,24 @@ def test_a_global_option_works_before_and_after_the_command(
 
 
 @pytest.mark.parametrize("option", ["--config", "--data"])
-def test_of_a_global_option_that_stands_twice_the_later_one_counts(option):
+def test_the_later_of_two_equal_global_options_counts(option):
     args = build_parser().parse_args([option, "early", "status", option, "late"])
     assert getattr(args, option.strip("-")) == Path("late")
 
 
-def test_other_global_options_stay_as_they_stood_before_the_command():
+def test_global_options_before_and_after_the_command_are_combined():
     args = build_parser().parse_args(["--data", "demo", "-v", "status", "--no-color"])
     assert (args.data, args.verbose, args.no_color) == (Path("demo"), True, True)
 
 
 @pytest.mark.slow
-def test_the_board_of_a_folder_named_before_the_command_is_shown(recorded):
+def test_status_of_a_folder_named_before_the_command_is_shown(recorded):
     before = traction("--data", recorded.data, "status")
     assert before == traction("status", "--data", recorded.data)
     assert before.code == 0
 
 
-def test_version_is_told_with_the_commit():
+def test_version_is_printed_with_the_commit():
     done = traction("--version")
     assert (done.code, done.err) == (0, "")
     assert done.out.startswith("traction ")
@@ -119,7 +119,7 @@ def test_every_message_can_be_explained(name):
     assert f"exit code {message.exit_code}" in done.out
 
 
-def test_a_message_that_does_not_exist_is_refused_with_those_that_do():
+def test_an_unknown_message_is_refused_with_the_known_ones():
     done = traction("check", "--explain", "rain")
     assert done.code == 2
     assert "There is no message called 'rain'." in done.err
@@ -143,7 +143,7 @@ def test_check_of_the_settings_prints_every_section(config):
         assert f"   {section}." in done.out
 
 
-def test_status_counts_kept_trials_of_simulations_apart(recorded, config):
+def test_status_counts_kept_trials_of_simulations_separately(recorded, config):
     done = traction("status", "--data", recorded.data, "--config", config)
     lines = [line.split() for line in done.out.splitlines() if line.startswith("TF")]
     assert [line[1:3] for line in lines] == [["live", "0/10"], ["simulated", "2/10"]]
@@ -151,7 +151,7 @@ def test_status_counts_kept_trials_of_simulations_apart(recorded, config):
 
 
 @pytest.mark.parametrize(("number", "code"), [(errno.EIO, 6), (errno.EBADF, 1)])
-def test_a_disk_that_refuses_anything_is_no_bug(monkeypatch, number, code):
+def test_a_disk_error_is_distinguished_from_a_bug(monkeypatch, number, code):
     def refuse(_):
         raise OSError(number, os.strerror(number), "/data/sessions")
 
@@ -163,7 +163,7 @@ def test_a_disk_that_refuses_anything_is_no_bug(monkeypatch, number, code):
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
-def test_a_command_that_is_ended_from_outside_says_so(monkeypatch, number):
+def test_a_command_ended_by_a_signal_is_reported_as_interrupted(monkeypatch, number):
     closed = []
 
     def be_ended(_):
@@ -180,7 +180,7 @@ def test_a_command_that_is_ended_from_outside_says_so(monkeypatch, number):
     assert signal.getsignal(number) is before
 
 
-def test_a_command_started_to_outlive_its_terminal_does(monkeypatch, tmp_path):
+def test_a_command_that_ignores_a_hangup_runs_on(monkeypatch, tmp_path):
     load_settings = load.load_settings
 
     def be_hung_up(path):

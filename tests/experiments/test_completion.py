@@ -1,4 +1,4 @@
-"""What the tab key offers, as a shell asks for it."""
+"""The tab key offers commands, terrains, sessions, trials, faults and messages."""
 
 import os
 import subprocess
@@ -14,7 +14,7 @@ pytestmark = pytest.mark.slow
 
 
 def offered(line, folder):
-    """Return what is offered after `line`, as argcomplete's shell function asks."""
+    """Words offered after `line`, as argcomplete's shell function asks."""
     answer = folder / "answer"
     environment = {
         **os.environ,
@@ -41,7 +41,7 @@ def test_commands_are_offered(tmp_path):
     assert set(COMMANDS) <= offered("traction ", tmp_path)
 
 
-def test_terrains_are_those_of_the_matrix(tmp_path):
+def test_terrains_of_the_matrix_are_offered(tmp_path):
     config = write_config(tmp_path)
     matrix = config.with_name("matrix.toml")
     matrix.write_text(matrix.read_text().replace('name = "Tf"', 'name = "Tm"'))
@@ -62,6 +62,6 @@ def test_faults_and_messages_are_offered(tmp_path):
     assert set(CATALOGUE) <= names
 
 
-def test_what_cannot_be_read_offers_nothing_and_says_nothing(tmp_path):
+def test_unreadable_settings_offer_nothing_without_an_error(tmp_path):
     (tmp_path / "rig.toml").write_text("[cann]\n")
     assert offered("traction run --config rig.toml S", tmp_path) <= {"S"}

@@ -1,4 +1,4 @@
-"""What works without extras; a command names the one that it misses."""
+"""Recording works without extras; a command names the extra that is missing."""
 
 import subprocess
 import sys
@@ -28,22 +28,22 @@ sys.exit(main({arguments!r}))
 
 
 def closure(names):
-    """Return the distributions that `names` install, with all that these need."""
-    found, left = set(), [canonicalize_name(name) for name in names]
+    """Distributions that `names` install, with all their dependencies."""
+    closed, left = set(), [canonicalize_name(name) for name in names]
     while left:
         name = left.pop()
-        if name in found:
+        if name in closed:
             continue
-        found.add(name)
+        closed.add(name)
         for line in metadata.requires(name) or ():
             need = Requirement(line)
             if need.marker is None or need.marker.evaluate({"extra": ""}):
                 left.append(canonicalize_name(need.name))
-    return found
+    return closed
 
 
 def foreign_modules():
-    """Return what can be imported here, and not where no extra is installed.
+    """Modules that can be imported here, but not where no extra is installed.
 
     SciPy takes a name among the imported modules for Sphinx itself, even a hidden one.
     """
@@ -60,7 +60,7 @@ def foreign_modules():
 
 
 def without(names, *arguments):
-    """Run a command where `names` cannot be imported; return how it ended."""
+    """Run a command where `names` cannot be imported; the ended process."""
     code = HIDDEN.format(names=names, arguments=[str(word) for word in arguments])
     words = [sys.executable, "-c", code]
     return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
@@ -72,7 +72,7 @@ def test_extras_are_those_of_the_distribution():
         for name, words in PROJECT["optional-dependencies"].items()
     }
     everything = declared.pop("all")
-    assert declared == {name: set(each.values()) for name, each in EXTRAS.items()}
+    assert declared == {name: set(extra.values()) for name, extra in EXTRAS.items()}
     assert everything == {f"traction[{','.join(sorted(EXTRAS))}]"}
 
 
@@ -104,7 +104,7 @@ def test_an_extra_whose_library_is_hidden_is_named(extra, monkeypatch):
 def test_a_command_names_its_missing_extra_first(
     extra, arguments, nth, recorded, monkeypatch, tmp_path
 ):
-    """Also of the last library of the extra, and nothing has been written then."""
+    """The first or the last library of the extra is missing; nothing is written."""
     monkeypatch.setitem(sys.modules, list(EXTRAS[extra])[nth], None)
     monkeypatch.chdir(tmp_path)
     done = traction(*arguments, "--data", recorded.data)
@@ -136,7 +136,7 @@ def test_without_any_extra_trials_are_recorded_verified_and_exported(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_notebook_fits_without_any_extra_and_names_that_of_a_picture():
+def test_a_notebook_fits_without_extras_and_names_the_extra_of_pictures():
     code = f"""
 import sys
 sys.modules.update(dict.fromkeys({foreign_modules()!r}))

@@ -1,4 +1,4 @@
-"""A file of another version is refused by one sentence that names it."""
+"""A file of another version is refused with a message that names both versions."""
 
 import json
 import shutil

@@ -33,7 +33,7 @@ def test_the_whole_catalogue_can_be_explained():
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
-def test_a_row_says_what_happened_and_more_and_breaks_no_table(name):
+def test_a_message_has_all_its_parts_and_breaks_no_table(name):
     message = CATALOGUE[name]
     what, do = message.sample()
     assert what.strip(" ….")
@@ -50,7 +50,7 @@ def test_exit_codes_are_those_that_the_help_explains():
     }
 
 
-def test_what_is_filled_in_is_left_open_in_a_table():
+def test_the_values_of_a_message_are_left_open_in_a_table():
     message = Message("{n:.0f} of {m} at T{k:02d}.", "Wait {s} s.", 0, "")
     assert message.sample() == ("… of … at T….", "Wait … s.")
     assert message.text({"n": 2.4, "m": 3, "k": 4, "s": 5}, "All safe.") == (
@@ -59,7 +59,7 @@ def test_what_is_filled_in_is_left_open_in_a_table():
 
 
 ARM_TEXTS = {
-    Action.END_TRIAL: ("holding",),  # as soon as the console has heard of it
+    Action.END_TRIAL: ("holding",),  # as soon as the console knows of the fault
     Action.HOLD: ("holding",),
     Action.DAMP: ("damped where it is",),
     Action.IDLE: ("idle", "stopped by its hardware", "UNKNOWN"),
@@ -67,7 +67,7 @@ ARM_TEXTS = {
 
 
 @pytest.mark.parametrize("fault", Fault)
-def test_the_message_of_a_fault_says_what_the_guard_makes_the_arm_do(fault):
+def test_the_message_of_a_fault_names_the_reaction_of_the_guard(fault):
     message, spec = CATALOGUE[fault.value], FAULTS[fault]
     assert message.exit_code == 4
     assert message.arm.startswith(ARM_TEXTS[spec.actions[-1]])
@@ -83,7 +83,7 @@ def test_the_numbers_of_a_fault_fill_its_message(fault):
 
 
 @pytest.mark.parametrize("fault", Fault)
-def test_a_fault_that_ends_what_is_done_names_the_command_that_goes_on(fault):
+def test_a_fault_outside_a_session_names_the_command_to_repeat(fault):
     detail = FAULTS[fault].detail
     numbers = () if detail is CircuitCauses else (7 for _ in fields(detail))
     context = FaultContext(prompt=None, command="traction zero")
@@ -98,7 +98,7 @@ LOAD = ComputerLoad(8.7, 2)
 SILENCE = verdict_for(Fault.CAN_SILENCE, ReplySilence(10.0, 0x7F))
 
 
-def test_a_computer_that_is_too_busy_is_said_first_and_no_cable_is_blamed():
+def test_a_busy_computer_is_named_first_and_no_cable_is_blamed():
     text = fault_text(SILENCE, FaultContext("T03", 1.5, load=LOAD))
     assert text.startswith(
         "This computer is too busy to simulate on the wall clock (load 8.7, cores 2)."
@@ -109,13 +109,13 @@ def test_a_computer_that_is_too_busy_is_said_first_and_no_cable_is_blamed():
     assert "cable" not in text
 
 
-def test_a_real_arm_or_a_rehearsed_fault_is_told_as_it_is():
+def test_without_a_busy_computer_the_cable_is_named():
     text = fault_text(SILENCE, FaultContext("T03", 1.5))
     assert "busy" not in text
     assert "Check the CAN cable" in text
 
 
-def test_what_is_no_matter_of_time_is_not_blamed_on_the_computer():
+def test_a_fault_unrelated_to_timing_is_not_blamed_on_the_computer():
     spec = FAULTS[Fault.OVERSPEED]
     detail = spec.detail(*(7 for _ in fields(spec.detail)))
     text = fault_text(
@@ -124,15 +124,15 @@ def test_what_is_no_matter_of_time_is_not_blamed_on_the_computer():
     assert "busy" not in text
 
 
-def test_a_refusal_that_blames_cables_says_the_computer_first():
+def test_a_refusal_names_a_busy_computer_instead_of_cables():
     error = UnfitDeviceError("Puck 5 does not answer.", hint="Check its cable.")
-    told = LOAD.blamed(error)
-    assert told.message.startswith("This computer is too busy")
-    assert "Puck 5 does not answer." in told.message
-    assert "cable" not in told.hint
+    refusal = LOAD.blamed(error)
+    assert refusal.message.startswith("This computer is too busy")
+    assert "Puck 5 does not answer." in refusal.message
+    assert "cable" not in refusal.hint
 
 
-def test_a_refusal_says_by_its_kind_whether_a_device_is_unfit():
+def test_the_type_of_a_refusal_says_whether_a_device_is_unfit():
     lost = {"lost": 60, "cycles": 100}
     assert isinstance(preflight_error("exchange", **lost), UnfitDeviceError)
     assert not isinstance(preflight_error("loop-dead"), UnfitDeviceError)
@@ -159,7 +159,7 @@ def test_a_computer_is_too_busy_where_programs_wait_for_a_core():
         (Fault.OVERSPEED, ArmState.DAMP, "damped where it is, until you let it hold"),
     ],
 )
-def test_a_message_says_what_the_arm_does_by_now(fault, state, arm):
+def test_a_message_names_the_present_state_of_the_arm(fault, state, arm):
     details = {
         Fault.PENDANT_IDLE: CircuitCauses(),
         Fault.OVERSPEED: JointExcess(6, 5.0, 4.0),

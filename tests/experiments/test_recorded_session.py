@@ -1,4 +1,4 @@
-"""What was recorded in format 1.0 stays readable, and a seed stays what it was."""
+"""Recordings of format 1.0 stay readable, and a seed keeps its recording."""
 
 import json
 import tarfile
@@ -19,7 +19,7 @@ SESSION = RECORDED / "session-1.0.tar.xz"
 
 @pytest.fixture
 def recorded(tmp_path):
-    """Return the data folder and the rig.toml of the recorded session."""
+    """The data folder and the rig.toml of the recorded session."""
     with tarfile.open(SESSION) as archive:
         archive.extractall(tmp_path, filter="data")
     folder = only_session(tmp_path)
@@ -28,12 +28,12 @@ def recorded(tmp_path):
     return tmp_path, tmp_path / "rig.toml"
 
 
-def test_one_seed_records_the_cycles_it_always_did(tmp_path):
+def test_one_seed_always_records_the_same_cycles(tmp_path):
     kept = json.loads(KEPT.read_text())
-    found = digests_in_process(tmp_path)
-    if found["processor"] != kept["processor"]:
+    result = digests_in_process(tmp_path)
+    if result["processor"] != kept["processor"]:
         pytest.skip(f"no kernels of a {kept['processor']} processor on this one")
-    assert found["digests"] == kept["digests"]
+    assert result["digests"] == kept["digests"]
 
 
 def test_a_session_of_format_1_0_is_counted(recorded):
@@ -44,7 +44,7 @@ def test_a_session_of_format_1_0_is_counted(recorded):
     assert [(row["terrain"], row["kept"]) for row in rows if row["kept"]] == [("TF", 2)]
 
 
-def test_a_session_of_format_1_0_is_held_against_its_sidecars(recorded):
+def test_a_session_of_format_1_0_is_verified(recorded):
     data, config = recorded
     arguments = ("verify", "--all", "--data", data, "--config", config)
     assert traction(*arguments).code == 0
@@ -55,7 +55,7 @@ def test_a_session_of_format_1_0_is_held_against_its_sidecars(recorded):
     assert path.name in done.err
 
 
-def test_cycles_of_format_1_0_are_all_there(recorded):
+def test_cycles_of_format_1_0_are_complete(recorded):
     path = only_session(recorded[0]) / "trials" / "T01.mcap"
     cycles = TrialReader(path).cycles().data
     assert np.all(np.diff(cycles["cycle"]) == 1)

@@ -1,4 +1,4 @@
-"""Started by services and cron: closed streams, full disks; files of other editors."""
+"""The program runs with closed streams, full disks and files of other editors."""
 
 import os
 import subprocess
@@ -29,7 +29,7 @@ def started(tmp_path, *arguments, closed=(), full=False):
     )
 
 
-def test_a_status_without_streams_is_no_bug(tmp_path):
+def test_status_works_without_streams(tmp_path):
     done = started(tmp_path, "status", "--data", tmp_path, closed=CLOSED)
     assert done.returncode == 0
     assert [path.name for path in tmp_path.iterdir()] == []  # no log of a bug
@@ -69,7 +69,7 @@ def test_processes_keep_their_memory_without_streams(tmp_path):
     ],
     ids=" ".join,
 )
-def test_output_to_a_full_disk_is_told(tmp_path, arguments):
+def test_output_to_a_full_disk_is_reported(tmp_path, arguments):
     done = started(tmp_path, *arguments, full=True)
     assert done.returncode == 6
     assert "The output cannot be written (No space left on device)." in done.stderr
@@ -78,7 +78,7 @@ def test_output_to_a_full_disk_is_told(tmp_path, arguments):
 
 @pytest.mark.slow
 @pytest.mark.timeout(120)
-def test_a_session_that_nobody_sees_any_more_pauses(tmp_path):
+def test_a_session_without_output_ends_unfinished(tmp_path):
     data = tmp_path / "data"
     done = started(
         tmp_path,
@@ -91,14 +91,14 @@ def test_a_session_that_nobody_sees_any_more_pauses(tmp_path):
     assert started(tmp_path, "verify", "--all", "--data", data).returncode == 0
 
 
-def test_a_byte_order_mark_is_no_part_of_a_file(tmp_path):
+def test_a_byte_order_mark_of_a_settings_file_is_ignored(tmp_path):
     config = write_config(tmp_path)
     text = config.read_bytes()
     config.write_bytes(b"\xef\xbb\xbf" + text)
     assert load_settings(config).rig_text.encode() == text
 
 
-def test_an_error_names_the_file_that_was_given(tmp_path):
+def test_an_error_names_the_given_file(tmp_path):
     config = write_config(tmp_path)
     other = config.rename(config.with_name("arm-2.toml"))
     other.write_text(other.read_text() + "\n[nothing]\n")
@@ -108,7 +108,7 @@ def test_an_error_names_the_file_that_was_given(tmp_path):
     assert "rig.toml" not in done.err
 
 
-def test_a_folder_that_is_gone_is_told(tmp_path):
+def test_a_removed_working_folder_is_reported(tmp_path):
     command = 'mkdir gone && cd gone && rmdir ../gone && exec "$@"'
     done = subprocess.run(
         ["bash", "-c", command, "start", sys.executable, "-m", "traction", "status"],
