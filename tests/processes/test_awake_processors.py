@@ -14,20 +14,20 @@ LATENCY = Path("/dev/cpu_dma_latency")
 
 
 def holders():
-    """Return the processes that hold the kernel's promise of short wake-ups."""
-    found = set()
+    """Processes that hold the kernel's guarantee of short wake-ups."""
+    pids = set()
     for process in Path("/proc").glob("[0-9]*"):
         try:
             opened = [path.readlink() for path in (process / "fd").iterdir()]
         except OSError:
             continue  # another user's, or gone
         if LATENCY in opened:
-            found.add(int(process.name))
-    return found
+            pids.add(int(process.name))
+    return pids
 
 
 @pytest.mark.skipif(not os.access(LATENCY, os.W_OK), reason="it may not be asked for")
-def test_one_process_asks_for_it_and_takes_it_along():
+def test_one_process_keeps_the_processors_awake_until_it_ends():
     before = holders()
     settings = load_settings(None)
     rig = build_rig(settings, settings.row("S0"), FakeOptions("processes", seed=1))

@@ -1,4 +1,4 @@
-"""A served arm whose commissioning is not there, stale or edited is not driven."""
+"""A served arm whose commissioning is missing, stale or edited is not driven."""
 
 import json
 import os
@@ -25,7 +25,7 @@ REFUSED = "This arm is not commissioned"
 
 @pytest.fixture
 def config(tmp_path):
-    """Return settings of a real rig whose bus is served at `tmp_path`/bus."""
+    """Settings of a real rig whose bus is served at `tmp_path`/bus."""
     return served_config(tmp_path)
 
 
@@ -74,7 +74,7 @@ def run_at_terminal(config, data):
 
 
 def commissioned(config):
-    """Write a record of sound steps beside `config`; a busy machine seems silent."""
+    """Write a record of sound steps next to `config`; repeated on a busy machine."""
     for left in reversed(range(TRIES)):
         try:
             return write_passed_commissioning(config)
@@ -85,7 +85,7 @@ def commissioned(config):
 
 
 def page(config, data):
-    """Return what `run` shows once the arm answers; a busy machine seems silent."""
+    """Output of `run` once the arm replies; repeated on a busy machine."""
     for _ in range(TRIES):
         seen = run_at_terminal(config, data)
         if "commission" in seen:
@@ -120,7 +120,7 @@ def test_an_arm_with_an_edited_record_is_not_driven(config, tmp_path):
 
 
 def zeroed(config):
-    """Zero the served arm, which stands at home; a busy machine seems silent."""
+    """Zero the served arm, which is at home; repeated on a busy machine."""
     for _ in range(TRIES):
         done = traction("zero", "--yes", "--config", config)
         if done.code == 0:

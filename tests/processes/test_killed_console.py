@@ -1,4 +1,4 @@
-"""The console is killed in a trial: the file is ended, nothing is left behind."""
+"""A console killed in a trial leaves a closed file, and no process or folder."""
 
 import os
 import signal
@@ -24,7 +24,7 @@ from tests.processes.watching import (
 )
 
 pytestmark = [pytest.mark.wall_clock, pytest.mark.timeout(240)]
-STALLS = {Fault.FT_STALE, Fault.LOOP_LATE, Fault.CAN_SILENCE}  # how they end a trial
+STALLS = {Fault.FT_STALE, Fault.LOOP_LATE, Fault.CAN_SILENCE}  # ends of a trial
 
 
 def all_gone(seen):
@@ -33,18 +33,18 @@ def all_gone(seen):
 
 
 def rooms(pid):
-    """Return the folders in which process `pid` serves a simulated rig."""
+    """Folders in which process `pid` serves a simulated rig."""
     return list(Path(tempfile.gettempdir()).glob(f"traction-{pid}-*"))
 
 
 @pytest.fixture(scope="module")
 def killed(tmp_path_factory):
-    """Return data and pids of a session whose console was killed in its trial."""
+    """Data and pids of a session whose console was killed in its trial."""
     return judged(tmp_path_factory.mktemp("killed"), killed_once)
 
 
 def killed_once(data):
-    """Return the session; None if the machine stood still and ended the trial."""
+    """The session; None if a stall of the machine ended the trial."""
     with session(data) as seen:
         if not seen.wait_for_trial():
             return None
@@ -57,12 +57,12 @@ def killed_once(data):
 
 
 def stop_reason(data):
-    """Return how the trial that the recorder put away ended."""
+    """Stop reason of the trial that the recorder closed."""
     (folder,) = list_sessions(data)
     return TrialReader(folder.trials / "T01.mcap").metadata["result"]["stop_reason"]
 
 
-def test_the_recorder_ends_the_file_of_a_killed_console(killed):
+def test_the_recorder_closes_the_file_of_a_killed_console(killed):
     (folder,) = list_sessions(killed.data)
     path = folder.trials / "T01.mcap"
     assert verify_file(path).duration > 1.0
@@ -74,7 +74,7 @@ def test_no_folder_of_the_simulated_rig_is_left(killed):
     assert rooms(killed.pids["fake rig"]) == []
 
 
-def test_the_trial_is_put_away_whole_when_the_session_is_opened_again(killed):
+def test_the_trial_is_rejected_whole_when_the_session_is_reopened(killed):
     (unfinished,) = find_unfinished(killed.data)
     assert unfinished.seconds > 1.0
     done = traction("note", "S001", "the console was killed", "--data", killed.data)

@@ -1,4 +1,4 @@
-"""A serial sensor in a process of its own is pulled out, and put in again."""
+"""A serial sensor in its own process is unplugged and plugged in again."""
 
 import pytest
 
@@ -10,7 +10,7 @@ from tests.processes.watching import until
 pytestmark = pytest.mark.wall_clock
 ROW = "S0"
 FRESH_NS = 50_000_000
-FOUND_AGAIN = 25.0  # s; boot text, ritual, rate check, on a machine with other work
+FOUND_AGAIN = 25.0  # s; boot text, start-up, rate check, on a machine with other work
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""A session does not notice a second screen, whatever becomes of it."""
+"""A second screen does not affect a session, whatever happens to the screen."""
 
 import os
 import signal
@@ -24,7 +24,7 @@ LONGEST = 20.0
 
 @pytest.fixture
 def session(tmp_path):
-    """Return (data folder, its memory) of a session that this process has open."""
+    """(data folder, shared memory) of a session that this process has open."""
     folder = create_session(tmp_path, "TF", is_simulated=True, utc_ns=0)
     shared = SharedLayout.create()
     with session_lock(folder):
@@ -33,7 +33,7 @@ def session(tmp_path):
 
 
 def watching(data):
-    """Start `traction watch`; return the process and where it serves."""
+    """Start `traction watch`; its process and port."""
     command = [sys.executable, "-c", START, "watch", "--port", "0", "--data", str(data)]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert server.stdout is not None
@@ -57,7 +57,7 @@ def end(server):
 
 @pytest.mark.timeout(3 * STALLED)
 @pytest.mark.long
-def test_a_client_that_stops_reading_costs_the_others_nothing(session):
+def test_a_client_that_stops_reading_does_not_affect_the_others(session):
     data, shared = session
     server, port = watching(data)
     try:
@@ -83,7 +83,7 @@ def _newest(viewer):
     return decode(CYCLE.type_name, messages[-1][1]).host_ns if messages else 0
 
 
-def test_a_killed_server_leaves_the_memory_as_it_was(session):
+def test_a_killed_server_leaves_the_memory_unchanged(session):
     data, shared = session
     server, port = watching(data)
     record = written(shared, 1)

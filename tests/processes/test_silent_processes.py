@@ -1,4 +1,4 @@
-"""A process of a running trial stops for a while; the arm does not wait for it."""
+"""A process that stops for a while during a trial does not endanger the arm."""
 
 import os
 import signal
@@ -32,7 +32,7 @@ HOG = (
     "end = time.monotonic() + float(sys.argv[2])\n"
     "while time.monotonic() < end: pass"
 )
-# Everything that can stand still beside a running arm, for how long [s].
+# Everything that can stall alongside a running arm, and for how long [s].
 STOPS = [
     (victim, seconds)
     for victim in ("console", "recorder", "sensor reader", "control", "every core")
@@ -59,9 +59,9 @@ def test_a_process_that_stops_for_a_while_ends_the_trial_only(
 
 
 def is_ended_with(data, victim, message):
-    """Return whether a trial ends as it should; None if it had another end before.
+    """Whether a trial ends as expected; None if it ended otherwise before.
 
-    On a machine that stalls, the guard ends it for the stall.
+    On a machine that stalls, the guard ends the trial for the stall.
     """
     with session(data) as seen:
         if not seen.wait_for_trial():
@@ -75,11 +75,11 @@ def is_ended_with(data, victim, message):
             held = until(lambda: holds(seen), LIMIT + REACTION)
         finally:
             os.kill(pid, signal.SIGCONT)
-        is_said = until(lambda: message in seen.output(), 5)
+        is_reported = until(lambda: message in seen.output(), 5)
         if seen.has_stalled():
             return None
         assert held
-        assert is_said, seen.output()
+        assert is_reported, seen.output()
         ends = [e["event"] for e in seen.journal()]
         assert "session-ended" not in ends
         return (
@@ -87,7 +87,7 @@ def is_ended_with(data, victim, message):
         )
 
 
-def test_ctrl_c_ends_a_session_with_everything_put_away(tmp_path):
+def test_ctrl_c_ends_a_session_without_partial_files(tmp_path):
     with running_trial(tmp_path) as seen:
         seen.process.send_signal(signal.SIGINT)
         assert seen.process.wait(15) == 5, seen.output()
@@ -96,7 +96,7 @@ def test_ctrl_c_ends_a_session_with_everything_put_away(tmp_path):
 
 
 def stop(seen, victim, seconds):
-    """Let a process, or every other program on the machine, stand still."""
+    """Stall a process, or every other program on the machine."""
     if victim == "every core":
         hogs = [
             subprocess.Popen([sys.executable, "-c", HOG, str(core), str(seconds)])
@@ -111,7 +111,7 @@ def stop(seen, victim, seconds):
 
 
 def true_speeds(data):
-    """Return the largest true speed of each joint in every trial [rad/s]."""
+    """Largest true speed of each joint in every trial [rad/s]."""
     paths = list(data.glob("sessions/*/*/T*.truth.mcap"))
     assert paths, "no truth was recorded"
     return [fastest(path) for path in paths]
@@ -134,7 +134,7 @@ def fastest(path):
         for case in STOPS
     ],
 )
-def test_whatever_stands_still_the_arm_is_not_thrown(tmp_path, victim, seconds):
+def test_the_arm_does_not_exceed_its_speed_whatever_stalls(tmp_path, victim, seconds):
     with running_trial(tmp_path) as seen:
         stop(seen, victim, seconds)
         assert until(seen.has_trial_ended, 60), seen.output()

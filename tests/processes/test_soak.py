@@ -1,4 +1,4 @@
-"""Minutes of the loop with its recorder, and an arm that is taken from it meanwhile."""
+"""The loop and its recorder run for minutes, and notice an arm that is taken."""
 
 import json
 import os
@@ -25,7 +25,7 @@ TORQUES = can.Message(arbitration_id=0x404, data=bytes(8), is_extended_id=False)
 
 
 @pytest.mark.parametrize("seconds", [30, pytest.param(600, marks=pytest.mark.long)])
-def test_nothing_is_lost_and_memory_stays(tmp_path, seconds):
+def test_no_recorded_cycle_is_lost_and_memory_does_not_grow(tmp_path, seconds):
     command = [sys.executable, "-c", START, "bench", "--fake", "--json"]
     done = subprocess.run(
         [*command, "--seconds", str(seconds)],
@@ -46,7 +46,7 @@ def test_nothing_is_lost_and_memory_stays(tmp_path, seconds):
     assert not {"traction-contro", "traction-record"} & set(children_of(1))
 
 
-def test_an_arm_that_another_master_takes_while_it_is_timed_is_not_called_held():
+def test_bench_reports_an_arm_that_another_master_takes():
     settings = load_settings(None)
     rig = build_rig(
         settings, settings.matrix.terrains[0], FakeOptions("processes", seed=1)

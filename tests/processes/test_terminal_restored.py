@@ -1,4 +1,4 @@
-"""A terminal is given back as it was, however a session on it ends."""
+"""A terminal is restored, however a session on it ends."""
 
 import contextlib
 import fcntl
@@ -15,13 +15,13 @@ import pytest
 from tests.processes.watching import is_stalled, judged, patient_config
 
 pytestmark = [pytest.mark.wall_clock, pytest.mark.timeout(200)]
-PATIENCE, LOOK = 20.0, 0.3  # s without a word, in all and at a time
+PATIENCE, LOOK = 20.0, 0.3  # s without output, in total and per look
 PRESS_EVERY = 4  # looks: more often a key would seem to be held
 TRIES = 5
 
 
 class Person:
-    """The end of a pseudo-terminal where somebody sits, and the program on it."""
+    """A person at a pseudo-terminal, and the program on it."""
 
     def __init__(self, *arguments):
         self.screen, self._program = pty.openpty()
@@ -38,7 +38,7 @@ class Person:
         )
 
     def settings(self):
-        """Return what `stty` would show."""
+        """Settings of the terminal, as `stty` shows them."""
         return termios.tcgetattr(self.screen)
 
     def type(self, keys):
@@ -50,9 +50,9 @@ class Person:
         self.shown += text
 
     def see(self, words, *, typing=""):
-        """Read until `words` stand on the screen, from now on; type until then.
+        """Read until `words` appear on the screen; type `typing` until then.
 
-        A key that comes with its prompt may be forgotten as one that came before.
+        A key that arrives together with its prompt may be dropped as an earlier one.
         """
         looks = 0
         while words not in self.text:
@@ -66,7 +66,7 @@ class Person:
         self.text = self.text.partition(words)[2]
 
     def end(self):
-        """Read on until the program has ended; return its exit code."""
+        """Read on until the program has ended; its exit code."""
         while self.process.poll() is None:
             if select.select([self.screen], [], [], 0.05)[0]:
                 self.read()
@@ -83,15 +83,15 @@ class Person:
 
 @contextlib.contextmanager
 def person_at(folder):
-    """Yield somebody at a session whose files are in `folder`."""
+    """A person at a session whose files are in `folder`."""
     folder.mkdir()
     options = ("--fake", "--processes", "--trials", 1)
     options += ("--config", patient_config(folder))
-    found = Person("run", "TF", *options, "--data", folder / "data")
+    person = Person("run", "TF", *options, "--data", folder / "data")
     try:
-        yield found
+        yield person
     finally:
-        found.close()
+        person.close()
 
 
 def once(person):
@@ -111,12 +111,12 @@ def hung_up(person):
 
 
 @pytest.mark.parametrize("leave", [once, twice, terminated, hung_up])
-def test_the_terminal_is_as_it_was_before_the_session(tmp_path, leave):
+def test_the_terminal_is_restored_after_a_session(tmp_path, leave):
     assert judged(tmp_path, lambda folder: is_restored(folder, leave), TRIES)
 
 
 def is_restored(folder, leave):
-    """Leave one session; None if it had ended because the machine stood still."""
+    """Leave one session; None if a stall of the machine had ended the session."""
     with person_at(folder) as person:
         try:
             leave_in_trial(person, leave)

@@ -1,4 +1,4 @@
-"""When a session says that the machine stood still, and when it does not."""
+"""The output of a session shows whether the machine stalled."""
 
 import pytest
 
@@ -20,5 +20,5 @@ LOOP = " ✔ loop 1 s       456.2 Hz · p99.9 late 1.97 ms · missed {}/490"
         ("", False),
     ],
 )
-def test_a_machine_that_stood_still_is_told_from_a_fault(text, stalled):
+def test_a_stalled_machine_is_distinguished_from_a_fault(text, stalled):
     assert is_stalled(text) is stalled

@@ -1,4 +1,4 @@
-"""A session in processes, seen from outside: who runs, what the arm does."""
+"""A session in processes, seen from outside: its processes, the state of the arm."""
 
 import json
 import os
@@ -33,10 +33,10 @@ NAMES = {
 }
 STALLED = re.compile(
     "late cycles in|No reply from the arm|not answered for|F/T sample [0-9]+ ms"
-    "|does not answer GET"  # before the loop: the simulated devices stood still
+    "|does not answer GET"  # before the loop: the simulated devices stalled
 )
-MEASURED = re.compile(r"missed (\d+)/(\d+)")  # what the preflight says of the loop
-MOST_MISSED = 0.05  # share of cycles beyond which any limit of the guard may be reached
+MEASURED = re.compile(r"missed (\d+)/(\d+)")  # the loop as measured by the preflight
+MAX_MISSED = 0.05  # share of cycles beyond which any limit of the guard may be reached
 START = "import sys; from experiments.__main__ import main; sys.exit(main())"
 
 
@@ -55,8 +55,8 @@ def until(condition, seconds):
 
 
 def children_of(pid):
-    """Return {short name: pid} of the living children of `pid`."""
-    found = {}
+    """{short name: pid} of the living children of `pid`."""
+    children = {}
     for task in Path("/proc").glob("[0-9]*"):
         try:
             fields = (task / "stat").read_text()
@@ -65,8 +65,8 @@ def children_of(pid):
         name = fields[fields.index("(") + 1 : fields.rindex(")")]
         state, parent = fields[fields.rindex(")") + 2 :].split()[:2]
         if int(parent) == pid and state != "Z":
-            found[name] = int(task.name)
-    return found
+            children[name] = int(task.name)
+    return children
 
 
 def is_running(pid):
@@ -78,10 +78,10 @@ def is_running(pid):
 
 
 def is_stalled(text):
-    """Return whether what a session said is that of a machine that stands still."""
+    """Whether the output of a session is that of a stalled machine."""
     measured = MEASURED.search(text)
     missed, cycles = map(int, measured.groups()) if measured else (0, 1)
-    return STALLED.search(text) is not None or missed > MOST_MISSED * cycles
+    return STALLED.search(text) is not None or missed > MAX_MISSED * cycles
 
 
 class Session:
@@ -94,7 +94,7 @@ class Session:
         self.shared = None
 
     def wait_for_trial(self):
-        """Return when a trial is being recorded; False if the machine is too slow."""
+        """Wait for the recording of a trial; False if the machine is too slow."""
         if not self.arrives(self._is_recording, 40):
             assert self.has_stalled(), self.output()
             return False
@@ -104,17 +104,17 @@ class Session:
         return True
 
     def arrives(self, is_there, seconds):
-        """Wait until `is_there()` is true, not long when the machine stood still."""
+        """Wait until `is_there()` is true, only briefly if the machine stalled."""
         if until(lambda: is_there() or self.has_stalled(), seconds) and is_there():
             return True
         return until(is_there, 5) is not None
 
     def attach(self):
-        """Look at the memory that the processes share."""
+        """Open the memory that the processes share."""
         self.shared = SharedLayout(SharedMemory(self._open_memory()))
 
     def has_stalled(self):
-        """Return whether the arm was stopped because the machine stood still.
+        """Whether the arm was stopped because the machine stalled.
 
         Either the message says so, or the preflight had measured a loop that misses so
         many cycles that joint 7, whose lock is stiff, shakes.
@@ -147,15 +147,15 @@ class Session:
         return (self.data / "out.txt").read_text()
 
     def newest_cycle_ns(self):
-        """Return when the newest cycle in memory was measured [monotonic ns]."""
+        """Time of the newest cycle in memory [monotonic ns]."""
         return int(self.shared.cycles.last(1)["host_ns"][0])
 
     def has_trial_ended(self):
-        """Return whether something was written after the trial's start."""
+        """Whether the journal has an event after the start of the trial."""
         return self.journal()[-1]["event"] != "trial-started"
 
     def kill(self, name):
-        """Kill the process `name`; return when [monotonic ns]."""
+        """Kill the process `name`; the time of the kill [monotonic ns]."""
         pid = self.process.pid if name == "console" else self.pids[name]
         os.kill(pid, signal.SIGKILL)
         return CLOCK.now_ns()
@@ -175,10 +175,10 @@ class Session:
 
 
 def patient_config(folder, **options):
-    """Write a configuration for a busy machine; return its rig.toml.
+    """Write a configuration for a busy machine; the path of its rig.toml.
 
-    Its loop bears late cycles, whose limit has tests in stepped time, and is measured
-    for one second only before the session. Options: as of `write_config`.
+    Its loop tolerates late cycles, whose limit is tested in stepped time, and is
+    measured for one second only before the session. Options: see `write_config`.
     """
     path = write_config(folder, **options)
     text = changed(path.read_text(), "late_per_second = 10 ", "late_per_second = 500 ")
@@ -187,29 +187,29 @@ def patient_config(folder, **options):
 
 
 def not_judged(tries):
-    """Skip a test whose sessions the machine ended, each of them, by standing still."""
+    """Skip a test whose sessions were all ended by stalls of the machine."""
     pytest.skip(f"not judged: the machine stood still in each of {tries} sessions")
 
 
 def judged(folder, attempt, tries=TRIES):
-    """Return what `attempt(folder of its own)` finds on a machine that may stall.
+    """Result of `attempt(folder of its own)` on a machine that may stall.
 
-    An attempt that the machine ended by standing still returns None, and another is
-    begun. One that ended like that without a stall of the witness is a failure.
+    An attempt that a stall has ended returns None and is repeated. If the witness saw
+    no stall meanwhile, the test fails.
     """
     with stall_witness(folder) as witness:
         for number in range(tries):
             start_ns = CLOCK.now_ns()
-            found = attempt(folder / f"try{number}")
-            if found is not None:
-                return found
+            result = attempt(folder / f"try{number}")
+            if result is not None:
+                return result
             assert witness.stalls_since(start_ns), "the machine did not stall"
     return not_judged(tries)
 
 
 @contextmanager
 def session(data, *options):
-    """Start a session; whatever is left of it at the end is ended."""
+    """Start a session; kill what is left of its processes at the end."""
     data.mkdir(parents=True, exist_ok=True)
     config = patient_config(data)
     command = [sys.executable, "-c", START, "run", "S0", "--fake", "--processes"]
@@ -233,10 +233,10 @@ def session(data, *options):
 
 @contextmanager
 def running_trial(folder, tries=TRIES):
-    """Yield a session in the second second of its trial.
+    """A session in the second second of its trial.
 
-    A machine that stalls, as the witness saw, may end a trial, or never let it begin;
-    another is begun then.
+    If a stall that the witness saw has ended the trial or kept it from beginning,
+    another session is started.
     """
     with stall_witness(folder) as witness:
         for number in range(tries):
