@@ -1,4 +1,4 @@
-"""The disks that a power cut may leave behind a list of operations."""
+"""Possible states of a disk after a list of operations and a power cut."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -25,7 +25,7 @@ HOW = ("none", "all", "first", "torn", "some", "zeros")
 
 @dataclass
 class Disk:
-    """Names and contents that are on the disk after a power cut.
+    """Names and contents on a disk after a power cut.
 
     Attributes:
         names: number of the file at each path, `FOLDER` for a folder.
@@ -36,7 +36,7 @@ class Disk:
     contents: dict[int, bytes] = field(default_factory=dict)
 
     def files(self) -> dict[Path, bytes]:
-        """Return the content at every path that can be reached from the root."""
+        """Content at every path that can be reached from the root."""
         return {
             path: self.contents.get(number, b"")
             for path, number in self.names.items()
@@ -44,12 +44,12 @@ class Disk:
         }
 
     def folders(self) -> list[Path]:
-        """Return the folders that can be reached from the root, outer ones first."""
+        """Folders that can be reached from the root, outer ones first."""
         names = [path for path, number in self.names.items() if number == FOLDER]
         return sorted(path for path in names if self._is_reached(path))
 
     def write(self, folder: Path) -> None:
-        """Make the files in the empty folder `folder`."""
+        """Write the files into the new folder `folder`."""
         folder.mkdir()
         for path in self.folders():
             (folder / path).mkdir()
@@ -68,12 +68,12 @@ class Disk:
 
 
 def everything(operations: Sequence[Operation]) -> Disk:
-    """Return the disk after all operations and no power cut."""
+    """Disk after all operations and no power cut."""
     return _disk(list(operations))
 
 
 def after_power_cut(operations: Sequence[Operation], rng: np.random.Generator) -> Disk:
-    """Return one disk that a power cut right after `operations` may leave.
+    """One possible disk after a power cut right after `operations`.
 
     What was forced to the disk is there. Of the rest, each file and each folder has
     nothing, everything, a first part, a torn last part, any part, or zeros.
@@ -89,7 +89,7 @@ def after_power_cut(operations: Sequence[Operation], rng: np.random.Generator) -
 
 
 def _object_of(operation: Operation) -> int | Path:
-    """Return the file or folder whose content an operation changes."""
+    """File or folder whose content an operation changes."""
     match operation:
         case Write() | Truncate() | SyncFile():
             return operation.file
@@ -110,7 +110,7 @@ def _by_object(operations: Sequence[Operation]) -> dict[int | Path, list[int]]:
 
 
 def _forced(operations: Sequence[Operation]) -> set[int]:
-    """Return the indices of all operations that a later one forced to the disk."""
+    """Indices of all operations that a later one forced to the disk."""
     forced: set[int] = set()
     waiting: dict[int | Path, list[int]] = {}
     for i, operation in enumerate(operations):
@@ -124,7 +124,7 @@ def _forced(operations: Sequence[Operation]) -> set[int]:
 def _part(
     late: list[int], operations: Sequence[Operation], rng: np.random.Generator
 ) -> list[tuple[int, Operation]]:
-    """Return what has reached the disk of operations that nothing forced there."""
+    """Random part, on the disk, of operations that were not forced there."""
     how = HOW[rng.integers(len(HOW))]
     if how == "none" or not late:
         return []

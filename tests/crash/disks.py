@@ -1,4 +1,4 @@
-"""Disks that fail: the power, a write, a read, the space, in a session."""
+"""Rows of failing disks: power cuts, failing writes and reads, full disks."""
 
 from functools import cache
 from pathlib import Path
@@ -15,7 +15,7 @@ _DISKS = 60  # failing disks of a kind, in a night
 
 
 def disk_attacks() -> list[Attack]:
-    """Return rows of power cuts, and of each kind of failing disk."""
+    """Rows of power cuts, and of each kind of failing disk."""
     rows = [_power_cuts(1, RunBy.CI)]
     rows += [_power_cuts(seed, RunBy.NIGHTLY) for seed in _NIGHTS]
     rows += [_failing(kind, 1, 1, RunBy.CI) for kind in KINDS]
@@ -25,7 +25,7 @@ def disk_attacks() -> list[Attack]:
 
 @cache
 def recorded_session() -> Recording:
-    """Return a session whose every change of the disk is known, recorded once."""
+    """A session whose every change of the disk is recorded, made once."""
     with TemporaryDirectory(prefix="disks-") as folder:
         return record_session(Path(folder))
 

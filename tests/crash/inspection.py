@@ -1,4 +1,4 @@
-"""What the program makes of a disk after a power cut."""
+"""Inspects what the program recovers from a disk after a power cut."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -18,15 +18,15 @@ from tests.experiments.program import Done, digest, traction
 
 CLOCK = SystemClock()
 LEFT_BEHIND = ("*.tmp", "*.mcap.partial", ".recover-*")
-FLUSHES = 3  # after so many there is more in a trial file than its header
+FLUSHES = 3  # after so many a trial file holds more than its header
 Journals = dict[Path, list[dict]]  # events by folder, relative to the data
 
 
 def acknowledged(operations: Sequence[Operation]) -> Journals:
-    """Return the events of each session that are for good, by its folder.
+    """Durable events of each session, by its folder.
 
-    An event is for good from the moment at which the journal that has it was forced to
-    the disk: the program tells the operator of it then.
+    An event is durable once its journal was forced to the disk; the program reports
+    the event to the operator only then.
     """
     names = everything(operations).names
     journals = {n: path for path, n in names.items() if path.name == JOURNAL_FILE}
@@ -39,7 +39,7 @@ def acknowledged(operations: Sequence[Operation]) -> Journals:
 
 
 def recordings(operations: Sequence[Operation]) -> int:
-    """Return how many trial files hold some recording that was forced to the disk."""
+    """Number of trial files with some recording that was forced to the disk."""
     forced = Counter(o.file for o in operations if isinstance(o, SyncFile))
     begun = {
         operation.file
@@ -54,12 +54,12 @@ def _is_trial(path: Path) -> bool:
 
 
 def events_in(journal: bytes) -> list[dict]:
-    """Return the events of a journal."""
+    """Events of a journal."""
     return [event for event in map(parse_line, journal.splitlines()) if event]
 
 
 def checksum_and_size(events: Sequence[dict]) -> dict[tuple[int, int], str]:
-    """Return {(trial, attempt): sha256} of what was ever kept."""
+    """{(trial, attempt): sha256} of all attempts that were ever kept."""
     return {
         (event["trial"], event["attempt"]): event["sha256"]
         for event in events
@@ -68,12 +68,12 @@ def checksum_and_size(events: Sequence[dict]) -> dict[tuple[int, int], str]:
 
 
 def problems(root: Path, wanted: Journals, recorded: int) -> list[str]:
-    """Return what is wrong with `root`/data, looked at and put in order.
+    """Problems of `root`/data, after reading and recovering the sessions.
 
     Args:
-        root: what is on the disk after a power cut.
-        wanted: the events that must not be lost, see `acknowledged`.
-        recorded: how many recordings must be there, see `recordings`.
+        root: folder with the files after a power cut.
+        wanted: events that must not be lost, see `acknowledged`.
+        recorded: number of recordings that must exist, see `recordings`.
     """
     wrong, data = [], root / "data"
     commands = [("status",), ("verify", "--all"), ("recover", data), ("status",)]
@@ -103,14 +103,14 @@ def put_in_order(data: Path) -> None:
 
 
 def _bug(command: str, done: Done, *, is_empty: bool) -> list[str]:
-    """Return what is wrong with an answer; without a session 2 is right, too."""
+    """Problem of a command's exit code; without a session 2 is right, too."""
     if done.code in {0, 6} or (is_empty and done.code == 2):
         return []
     return [f"{command} ends with {done.code}: {done.err}"]
 
 
 def _lost(session: SessionFolder, wanted: Sequence[dict]) -> list[str]:
-    """Return the events and trials that are not there, or are not what they were."""
+    """Events and trials that are missing or changed."""
     events = session.events()
     wrong = [] if events[: len(wanted)] == wanted else ["events are lost"]
     counted = {path.stem: digest(path) for path in session.kept_trials()}

@@ -1,4 +1,4 @@
-"""A disk that is full, broken, or a process without descriptors, in a session."""
+"""Sessions on a full or broken disk, or in a process without descriptors."""
 
 import errno
 import shutil
@@ -25,19 +25,19 @@ KINDS = (
 )
 ENDED = {0, 2, 4, 5, 6}
 AUTO = ("--operator-script", "auto")
-BYTES = 400_000  # that a session writes about
-CALLS = 500  # that a session makes about
+BYTES = 400_000  # written by a session, roughly
+CALLS = 500  # made by a session, roughly
 
 
 @dataclass
 class FailingDisk:
-    """Lets calls of one kind fail from a random moment on; a limit of `recorded`.
+    """Makes calls of one kind fail from some moment on; a `limit` of `recorded`.
 
     Attributes:
         kind: one of `KINDS`.
-        left: bytes until it is full, or calls until it breaks.
-        lasts: how many calls fail.
-        failed: how many have failed.
+        left: bytes until the disk is full, or calls until it breaks.
+        lasts: number of calls that fail.
+        failed: number of calls that have failed.
     """
 
     kind: str
@@ -78,7 +78,7 @@ class FailingDisk:
 
 
 def random_disk(rng: np.random.Generator, kinds: Sequence[str]) -> FailingDisk:
-    """Return a disk that fails somewhere in a session."""
+    """A disk that fails at a random moment of a session."""
     kind = kinds[rng.integers(len(kinds))]
     lasts = int(rng.integers(1, 6)) if kind != "full" else 1 << 30
     left = rng.integers(BYTES) if kind.startswith("full") else rng.integers(CALLS)
@@ -86,10 +86,10 @@ def random_disk(rng: np.random.Generator, kinds: Sequence[str]) -> FailingDisk:
 
 
 def fail(folder: Path, runs: int, seed: int, kinds: Sequence[str] = KINDS) -> list[str]:
-    """Run sessions on failing disks; return what went wrong.
+    """Run sessions on failing disks; the problems that follow.
 
-    A session has two trials; a kept one is repeated and a verdict changed then. The
-    disk is sound again when its files are looked at.
+    A session has two trials; then a verdict is changed and a kept trial repeated. The
+    disk is sound again when its files are inspected.
     """
     config = write_config(folder)
     rng = np.random.default_rng(seed)
@@ -101,17 +101,17 @@ def fail(folder: Path, runs: int, seed: int, kinds: Sequence[str] = KINDS) -> li
         with recorded(root, disk) as recording:
             done = use(config, root / "data")
         operations = recording.operations
-        found = [f"ended with {d.code}: {d.err}" for d in done if d.code not in ENDED]
+        texts = [f"ended with {d.code}: {d.err}" for d in done if d.code not in ENDED]
         if disk.failed and not any(d.err or "▲" in d.out for d in done):
-            found.append("nothing was said")
-        found += problems(root, acknowledged(operations), recordings(operations))
-        wrong += [f"{number} {disk}: {text}" for text in found]
+            texts.append("nothing was said")
+        texts += problems(root, acknowledged(operations), recordings(operations))
+        wrong += [f"{number} {disk}: {text}" for text in texts]
         shutil.rmtree(root)
     return wrong
 
 
 def use(config: Path, data: Path) -> list[Done]:
-    """Run a session and change it; return how each command ended."""
+    """Run a session and change it; the result of each command."""
     options = ("--data", data)
     done = [run_session(config, data)]
     if done[0].code == 0:
@@ -123,7 +123,7 @@ def use(config: Path, data: Path) -> list[Done]:
 
 
 def run_session(config: Path, data: Path) -> Done:
-    """Run two short trials; the session may not even be made."""
+    """Run two short trials; even the creation of the session may fail."""
     usual = AutoOperator.answer
 
     def answer(self, asked):

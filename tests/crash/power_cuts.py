@@ -1,4 +1,4 @@
-"""A session whose every change of the disk is known, and power cuts anywhere in it."""
+"""Power cuts anywhere in a session whose every change of the disk is recorded."""
 
 import shutil
 from pathlib import Path
@@ -21,13 +21,13 @@ AUTO = ("--operator-script", "auto")
 
 
 def record_session(folder: Path) -> Recording:
-    """Return the operations of a session with a rejected trial and changed verdicts.
+    """Operations of a session with a rejected trial and changed verdicts.
 
     T01 is rejected, T01 and T02 are kept; later T01b is rejected and kept again and
     T02 is repeated.
 
     Args:
-        folder: for the data and the configuration.
+        folder: folder of the data and the configuration.
     """
     config = write_config(folder)
     data = folder / "recorded" / "data"
@@ -55,9 +55,9 @@ def record_session(folder: Path) -> Recording:
 
 
 def survive(recording: Recording, folder: Path, cuts: int, seed: int) -> list[str]:
-    """Cut the power `cuts` times at random moments; return what went wrong.
+    """Cut the power `cuts` times at random moments; the problems that follow.
 
-    Every third disk is put in order while the power fails once more.
+    Every third disk is recovered while the power fails once more.
     """
     rng = np.random.default_rng(seed)
     wrong = []
@@ -73,7 +73,7 @@ def survive(recording: Recording, folder: Path, cuts: int, seed: int) -> list[st
             shutil.rmtree(root)
             until = int(rng.integers(second.start, len(second.operations) + 1))
             after_power_cut(second.operations[:until], rng).write(root)
-        found = problems(root, wanted, recordings(operations))
-        wrong += [f"{number} after {length} operations: {text}" for text in found]
+        texts = problems(root, wanted, recordings(operations))
+        wrong += [f"{number} after {length} operations: {text}" for text in texts]
         shutil.rmtree(root)
     return wrong

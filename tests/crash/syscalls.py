@@ -1,8 +1,8 @@
-"""What the program does to the disk, recorded at the calls it makes.
+"""Records the changes of the disk at the system calls of the program.
 
-The program is not changed and nothing is simulated: every call goes through, and what
-it did to files below one folder is written down. `test_power_cuts` proves that the list
-is complete: done again, it gives the very files that are on the disk.
+The program is not changed and nothing is simulated: every call goes through, and its
+effect on files below one folder is recorded. `test_disks` shows that the list is
+complete: replayed, it gives the files that are on the disk.
 """
 
 import io
@@ -58,7 +58,7 @@ class RemoveFolder:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A name that a file got, its first or another."""
+    """A name given to a file, the first or another."""
 
     path: Path
     file: int
@@ -66,7 +66,7 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class Unlink:
-    """A name that was taken away."""
+    """A name that was removed."""
 
     path: Path
 
@@ -111,14 +111,14 @@ def without_limit(_: str, size: int) -> int:
 
 
 class Recording:
-    """The operations on files and folders below `root`, in their order.
+    """The operations on files and folders below `root`, in order.
 
-    What is there already counts as made and forced to the disk before.
+    Existing files and folders count as made and forced to the disk before.
 
     Attributes:
         root: the recorded folder.
-        operations: what was done below it.
-        start: how many of them were done before.
+        operations: operations below that folder.
+        start: number of operations that made the existing files.
     """
 
     def __init__(self, root: Path, limit: Limit) -> None:
@@ -151,7 +151,7 @@ class Recording:
         ]
 
     def below(self, path: object, folder: int | None = None) -> Path | None:
-        """Return `path` relative to the root, None outside of it."""
+        """`path` relative to the root; None outside the root."""
         if not isinstance(path, str | os.PathLike):
             return None
         location = Path(os.fspath(path))
@@ -162,14 +162,14 @@ class Recording:
         return location.relative_to(self.root) if inside else None
 
     def is_inside(self, file: object) -> bool:
-        """Return whether a path or a descriptor is one below the root."""
+        """Whether a path or a descriptor is below the root."""
         location = (
             Path(f"/proc/self/fd/{file}").readlink() if type(file) is int else file
         )
         return self.below(location) is not None
 
     def opened(self, path: Path, descriptor: int, flags: int, *, was_there: bool):
-        """Note a file that was opened, and that it is new or was emptied."""
+        """Record a file that was opened, and whether the file is new or was emptied."""
         if not flags & _WRITING:
             return
         if not was_there:
@@ -189,7 +189,7 @@ class Recording:
             self.operations.append(Write(self._open[descriptor], offset, data))
 
     def write_offset(self, descriptor: int) -> int:
-        """Return where the next write of a descriptor goes; 0 outside the folder."""
+        """Offset of the next write of a descriptor; 0 outside the folder."""
         if descriptor not in self._open:
             return 0
         if descriptor in self._appending:
@@ -275,7 +275,7 @@ def _flags(mode: str) -> int:
 
 
 def _recorded_open(recording: Recording):
-    """Return what stands in for `io.open` and `os.fdopen`."""
+    """Replacement of `io.open` and `os.fdopen`."""
     kind = type("_File", (_RecordedFile,), {"recording": recording})
     read_only = type("_Read", (_LimitedFile,), {"limit": staticmethod(recording.limit)})
 
@@ -313,7 +313,7 @@ def _recorded_open(recording: Recording):
 
 
 def _recorded_calls(recording: Recording):
-    """Return what stands in for the calls of `os`, by their names."""
+    """Replacements of the calls of `os`, by name."""
     real = {name: getattr(os, name) for name in _CALLS}
 
     def os_open(path, flags, mode=0o777, *, dir_fd=None):
@@ -377,7 +377,7 @@ def _recorded_calls(recording: Recording):
 
     def fsync(descriptor):
         recording.limit("fsync", 0)
-        recording.synced(descriptor)  # what is forced is the content; no need to wait
+        recording.synced(descriptor)  # the order counts; no need to wait
 
     def close(descriptor):
         recording.closed(descriptor)
@@ -402,7 +402,7 @@ def _recorded_calls(recording: Recording):
 
 
 def _reading_calls(recording: Recording):
-    """Return what stands in for the calls of `os` that read, by their names."""
+    """Replacements of the reading calls of `os`, by name."""
 
     def on_read(name, what):
         real = getattr(os, name)
@@ -437,11 +437,11 @@ _CALLS = [
 
 @contextmanager
 def recorded(root: Path, limit: Limit = without_limit) -> Generator[Recording]:
-    """Give the list of what this process does to files below `root` meanwhile.
+    """Record what this process does to files below `root` in the context.
 
     Args:
         root: the recorded folder.
-        limit: lets calls fail as on a full or broken disk; what fails is not recorded.
+        limit: makes calls fail as on a full or broken disk; these are not recorded.
     """
     recording = Recording(root, limit)
     with pytest.MonkeyPatch.context() as patch:
