@@ -1,6 +1,6 @@
-"""A session whose journal lost lines, or that was copied and renamed: it is named.
+"""Sessions whose journal lost lines, or that were copied and renamed, are reported.
 
-What is damaged here can be read without an error; the harm would be silence.
+This damage can be read without an error; silence would be the harm.
 """
 
 import json
@@ -13,29 +13,29 @@ from tests.corpus.used_session import printed, session_file, session_files
 KEPT = 2  # trials of the session
 _SOUND_NAME = re.compile(r"\d{4}-\d\d-\d\d_S001_TF\.fake")  # a date is no identity
 _REFUSED, _NOT_AS_KEPT = 2, 6  # exit codes
-_MOST_COPIES = 12
+_MAX_COPIES = 12
 
 
 class SilentError(Exception):
-    """Something is missing or twice, and nobody was told."""
+    """Something is missing or doubled, and was not reported."""
 
 
 def all_lines() -> bytes:
-    """Return the numbers of all lines of the journal, as `use_lines` reads them."""
+    """Numbers of all lines of the journal, as `use_lines` reads them."""
     count = session_file("/events.jsonl").count(b"\n")
     return b" ".join(b"%d" % number for number in range(count))
 
 
 def all_names() -> bytes:
-    """Return the name of the session's folder, as `use_names` reads it."""
+    """Name of the session's folder, as `use_names` reads it."""
     return _name().encode()
 
 
 def use_lines(data: bytes, folder: Path) -> None:
-    """Keep the lines of the journal that `data` numbers, in its order.
+    """Keep the lines of the journal that `data` numbers, in that order.
 
     Raises:
-        SilentError: `verify` finds nothing wrong with another journal.
+        SilentError: `verify` finds nothing wrong with a changed journal.
     """
     lines = session_file("/events.jsonl").splitlines(keepends=True)
     numbers = [int(word) for word in re.findall(rb"\d{1,3}", data)]
@@ -49,10 +49,10 @@ def use_names(data: bytes, folder: Path) -> None:
 
     Raises:
         SilentError: a trial counts twice, or `verify` finds nothing wrong with more
-            than one copy or with a name that contradicts what is inside.
+            than one copy or with a name that contradicts the content.
     """
     names = [name for name in map(_as_name, data.split(b"\n")) if name]
-    copies = list(dict.fromkeys(names))[:_MOST_COPIES]
+    copies = list(dict.fromkeys(names))[:_MAX_COPIES]
     for name in copies:
         _write(folder, name, session_file("/events.jsonl"))
     is_sound = len(copies) == 1 and _SOUND_NAME.fullmatch(copies[0]) is not None
@@ -65,7 +65,7 @@ def _name() -> str:
 
 
 def _as_name(line: bytes) -> str:
-    """Return a line as the name of a folder, "" where none can have it."""
+    """A line as the name of a folder, "" if no folder can have the name."""
     name = os.fsdecode(line.replace(b"/", b"").replace(b"\0", b""))[:100]
     return "" if name in {".", ".."} or len(os.fsencode(name)) > 250 else name
 
@@ -80,7 +80,7 @@ def _write(folder: Path, name: str, journal: bytes) -> None:
 
 
 def _require(folder: Path, *, is_sound: bool) -> None:
-    """Require that `verify` tells what is not sound, and `status` counts once."""
+    """Require that `verify` reports what is not sound and `status` counts it once."""
     code, out = printed("verify", "--all", "--data", str(folder))
     if code not in ({0} if is_sound else {_REFUSED, _NOT_AS_KEPT}):
         raise SilentError(f"verify ended with {code}: {out}")

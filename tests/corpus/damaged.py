@@ -1,4 +1,4 @@
-"""Damaged inputs of every kind, read in a process of little memory."""
+"""Damaged inputs of every kind are read in a process of little memory."""
 
 import json
 import subprocess
@@ -14,7 +14,7 @@ _EACH_NIGHT = [range(first, first + 500) for first in range(1000, 3000, 500)]
 
 
 def damage_attacks() -> list[Attack]:
-    """Return rows of twenty, and of five hundred, inputs of every kind."""
+    """Rows of twenty, and of five hundred, inputs of every kind."""
     rows = [_attack(kind, _EACH_COMMIT, RunBy.CI) for kind in READERS]
     for seeds in _EACH_NIGHT:
         rows += [_attack(kind, seeds, RunBy.NIGHTLY) for kind in READERS]
@@ -37,9 +37,9 @@ def _attack(kind: str, seeds: range, run_by: RunBy) -> Attack:
 
 
 def read_damaged(kind: str, seeds: range) -> list[str]:
-    """Read the mutations `seeds` of a kind; return what did harm.
+    """Read the mutations `seeds` of a kind; the problems that follow.
 
-    One that ends the process of the reader is named, and the rest is read in another.
+    A mutation that ends the reading process is named; another process reads the rest.
     """
     problems: list[str] = []
     while seeds:

@@ -24,7 +24,7 @@ SHORT = Rubbing(joint_rate=100.0, wrench_rate=100.0)
 
 
 def read_log(name: str) -> Callable[[bytes, Path], None]:
-    """Return a reader that lists its bytes as a log, and imports them."""
+    """A reader that lists its bytes as a log, and imports them."""
 
     def read(data: bytes, folder: Path) -> None:
         path, urdf = folder / name, folder / "robot.urdf"
@@ -43,7 +43,7 @@ def read_urdf_bytes(data: bytes, _: Path) -> None:
 
 
 def read_message(data: bytes, _: Path) -> None:
-    """Read `data` as each of both messages in each serialization."""
+    """Read `data` as every message in each serialization."""
     for serialization in ("cdr", "ros1"):
         for read in (read_joints, read_wrench, read_header):
             try:
@@ -59,7 +59,7 @@ def read_import_record(data: bytes, folder: Path) -> None:
 
 @cache
 def log_samples() -> dict[str, bytes]:
-    """Return a sound input of every kind."""
+    """A sound input of every kind."""
     with tempfile.TemporaryDirectory(prefix="corpus-") as scratch:
         folder = Path(scratch)
         bag = write_bag(folder / "log.bag", SHORT)

@@ -1,4 +1,4 @@
-"""Seeded damage: bytes, lines, numbers and nesting that nobody meant to write."""
+"""Seeded damage of bytes, lines, numbers and nesting."""
 
 import re
 
@@ -33,13 +33,13 @@ _TOKENS = (
     b"$(touch out)",
 )
 _NUMBER = re.compile(rb"-?\d+(\.\d+)?")
-_MOST = 4  # damages to one input
+_MAX_DAMAGES = 4  # damages to one input
 
 
 def mutated(data: bytes, seed: int) -> bytes:
-    """Return `data` after one to four damages that `seed` names."""
+    """`data` after one to four damages drawn with `seed`."""
     rng = np.random.default_rng(seed)
-    for _ in range(rng.integers(1, _MOST, endpoint=True)):
+    for _ in range(rng.integers(1, _MAX_DAMAGES, endpoint=True)):
         change = _CHANGES[rng.integers(len(_CHANGES))]
         data = change(data, rng)
     return data
@@ -53,8 +53,8 @@ def _flip(data: bytes, rng: np.random.Generator) -> bytes:
     if not data:
         return b"\xff"
     offset = _offset(data[1:], rng)
-    spoilt = data[offset] ^ 1 << int(rng.integers(8))
-    return data[:offset] + bytes((spoilt,)) + data[offset + 1 :]
+    damaged = data[offset] ^ 1 << int(rng.integers(8))
+    return data[:offset] + bytes((damaged,)) + data[offset + 1 :]
 
 
 def _cut(data: bytes, rng: np.random.Generator) -> bytes:
@@ -77,20 +77,20 @@ def _insert(data: bytes, rng: np.random.Generator) -> bytes:
 
 
 def _other_number(data: bytes, rng: np.random.Generator) -> bytes:
-    found = list(_NUMBER.finditer(data))
-    if not found:
+    matches = list(_NUMBER.finditer(data))
+    if not matches:
         return data
-    number = found[rng.integers(len(found))]
+    number = matches[rng.integers(len(matches))]
     token = _TOKENS[rng.integers(len(_TOKENS))]
     return data[: number.start()] + token + data[number.end() :]
 
 
 def _other_value(data: bytes, rng: np.random.Generator) -> bytes:
-    """Replace what stands after a colon or an equals sign, up to the end of it."""
-    found = list(re.finditer(rb"[:=]\s*([^,}\n]*)", data))
-    if not found:
+    """Replace the value after a colon or an equals sign."""
+    matches = list(re.finditer(rb"[:=]\s*([^,}\n]*)", data))
+    if not matches:
         return data
-    value = found[rng.integers(len(found))]
+    value = matches[rng.integers(len(matches))]
     token = _TOKENS[rng.integers(len(_TOKENS))]
     return data[: value.start(1)] + token + data[value.end(1) :]
 

@@ -1,7 +1,7 @@
-"""Everything that is read from outside, each as a function of bytes and a folder.
+"""A reader for every kind of input, as a function of bytes and a folder.
 
-It puts the bytes where they belong in the empty folder and reads them as the program
-does. It returns or raises a `TractionError`; anything else is a failure.
+A reader puts the bytes where they belong in the empty folder and reads them as the
+program does. It returns or raises a `TractionError`; anything else is a failure.
 """
 
 import contextlib
@@ -107,7 +107,7 @@ def _settings(name: str) -> Callable[[bytes, Path], None]:
 
 
 def _text(parse: Callable[[str], object]) -> Callable[[bytes, Path], None]:
-    """Return a reader of a text that another file holds or that was read as UTF-8."""
+    """A reader of a text that another file holds or that was read as UTF-8."""
     return lambda data, _: parse(data.decode(errors="replace"))
 
 
@@ -118,7 +118,7 @@ def _compensate(text: str) -> None:
 
 
 def _table(name: str, **stated: Any) -> Callable[[bytes, Path], None]:
-    """Return a reader of a table whose layout is stated as for `load_tables`."""
+    """A reader of a table whose layout is stated as for `load_tables`."""
 
     def read(data: bytes, folder: Path) -> None:
         (folder / name).write_bytes(data)
@@ -190,7 +190,7 @@ def _bus_log(data: bytes, _: Path) -> None:
 
 
 def _frames(data: bytes, _: Path) -> None:
-    """Read frames of every length out of `data`, by every decoder."""
+    """Decode frames of every length in `data` by every decoder."""
     for start in range(0, len(data), 10):
         split_id(int.from_bytes(data[start : start + 2], "little") & 0x7FF)
         for decode in _DECODERS:
@@ -202,7 +202,7 @@ def _frames(data: bytes, _: Path) -> None:
 
 
 def _sensor(data: bytes, _: Path) -> None:
-    """Read `data` as the stream of each make, in pieces, and date what it holds."""
+    """Read `data` in pieces as the stream of each sensor kind; date the readings."""
     scanners = (
         bota.scanner(_RANGES),
         robotous.scanner(lambda: 1000.0),
@@ -233,7 +233,7 @@ def _trial(data: bytes, folder: Path) -> None:
 
 
 def _used(name: str) -> Callable[[bytes, Path], None]:
-    """Return a reader that puts its bytes into a whole session and works on that."""
+    """A reader that puts its bytes into a whole session and uses the session."""
     return lambda data, folder: use(name, data, folder)
 
 
@@ -298,5 +298,5 @@ EVENTS = (
 
 
 def journal_of(*events: dict[str, object]) -> bytes:
-    """Return a journal of events."""
+    """Journal of events, as bytes."""
     return b"".join(journal_line(event, n) for n, event in enumerate(events, 1))

@@ -1,4 +1,4 @@
-"""One sound input of each kind, small: what mutations begin with."""
+"""One small sound input of each kind, from which mutations start."""
 
 import hashlib
 import io
@@ -98,7 +98,7 @@ t\tv_t\tF_n\tF_t
 
 def _gravity() -> str:
     rng = np.random.default_rng(1)
-    found = GravityCalibration(
+    stored = GravityCalibration(
         mus=rng.normal(size=(7, 3)),
         residual=0.02,
         rank=12,
@@ -109,7 +109,7 @@ def _gravity() -> str:
         poses=rng.normal(size=(10, 7)),
         torques=rng.normal(size=(10, 7)),
     )
-    return gravity_to_toml(found)
+    return gravity_to_toml(stored)
 
 
 def _friction() -> str:
@@ -117,16 +117,16 @@ def _friction() -> str:
     friction = draw_friction(constants, 0.4, None, np.zeros(7))
     little = 0.01 * friction.coulomb
     fit = FrictionFit(friction, little, little, np.full(7, 0.02), (100,) * 7)
-    found = FrictionCalibration(fit, "tread", "cad", _UTC, is_simulated=True)
-    return friction_to_toml(found, constants)
+    stored = FrictionCalibration(fit, "tread", "cad", _UTC, is_simulated=True)
+    return friction_to_toml(stored, constants)
 
 
 def _sensor_calibration() -> str:
     fit = SensorFit(0.5, np.zeros(3), np.zeros(6), 0.0, 1.0, 0.02, 0.001)
-    found = SensorCalibration(
+    stored = SensorCalibration(
         fit, "tread", 0.1, _UTC, True, np.stack([np.eye(3)] * 6), np.zeros((6, 6))
     )
-    return sensor_to_toml(found)
+    return sensor_to_toml(stored)
 
 
 def _database() -> dict[str, object]:
@@ -202,17 +202,17 @@ def _frames() -> bytes:
 
 
 def _stream() -> bytes:
-    """Return 20 ms of each make of sensor."""
+    """20 ms of the stream of each sensor kind."""
     data = bytearray()
     for kind in SERIAL_KINDS:
         stream = make_stream(SensorChoice(kind), lambda _: (1.0,) * 6, None, 0)
-        data += b"".join(said for _, said in stream.due(20_000_000))
+        data += b"".join(chunk for _, chunk in stream.due(20_000_000))
     return bytes(data)
 
 
 @cache
 def samples() -> dict[str, bytes]:
-    """Return a sound input for every reader, by its name."""
+    """A sound input for every reader, by name."""
     shipped = resources.files("experiments.data")
     payload = payload_of(_TOOL)
     frame = TerrainFrame(0.1, 0.2, (0.7, 0.1, 0.12), 0.45)

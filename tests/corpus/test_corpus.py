@@ -1,4 +1,4 @@
-"""Inputs that once did harm, or might: each is read or refused, quickly."""
+"""Inputs that did harm once, or might, are read or refused quickly."""
 
 import json
 import os
@@ -56,9 +56,9 @@ def test_no_file_of_the_corpus_is_harmful():
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    said = [json.loads(line) for line in done.stdout.splitlines()]
-    assert len(said) == len(list(CORPUS.iterdir()))
-    assert [row for row in said if not row[1] or row[2] > SECONDS] == []
+    rows = [json.loads(line) for line in done.stdout.splitlines()]
+    assert len(rows) == len(list(CORPUS.iterdir()))
+    assert [row for row in rows if not row[1] or row[2] > SECONDS] == []
 
 
 def test_every_file_of_the_corpus_has_a_reader():
@@ -96,7 +96,7 @@ def test_settings_are_not_read_from_a_device(path):
         load_settings(Path(path))
 
 
-def test_settings_larger_than_any_matrix_are_not_read(tmp_path):
+def test_oversized_settings_are_not_read(tmp_path):
     config = tmp_path / "rig.toml"
     config.write_text("#" * 2_000_000)
     with pytest.raises(SettingsError, match="cannot be read"):

@@ -1,6 +1,6 @@
-"""Files of sizes that nothing legitimate has: refused in little memory, whole program.
+"""The whole program refuses oversized files in little memory.
 
-Sparse files cost no disk; what a command takes is read from the kernel.
+Sparse files take no disk; the memory of a command is read from the kernel.
 """
 
 import os
@@ -17,8 +17,8 @@ from tests.corpus.used_session import lay_out
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(180)]
 ROOT = Path(__file__).parents[2]
 MEMORY = 300 * 2**20
-# A process says at its end what it took at most: what the kernel tells its parent is
-# never less than the parent's own.
+# A process reports its peak memory at its end: the figure that the kernel gives to its
+# parent is never less than the parent's own.
 PEAK = """import atexit, os, re, sys
 
 def peak():
@@ -48,7 +48,7 @@ COMMANDS = (
 
 @dataclass(frozen=True)
 class Ended:
-    """How a command ended, and what it took [bytes]."""
+    """How a command ended, and its peak memory [bytes]."""
 
     code: int
     text: str
@@ -56,7 +56,7 @@ class Ended:
 
 
 def run(*arguments, cwd, code=START):
-    """Run `traction`, or other code, in a process of its own."""
+    """Run `traction`, or other code, in its own process."""
     log, peak = cwd / "out.txt", cwd / "peak.txt"
     more = {"OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT), "PEAK": str(peak)}
     with log.open("w") as out:
@@ -72,7 +72,7 @@ def run(*arguments, cwd, code=START):
 
 
 def sparse(path, size):
-    """Let `path` be as long as `size`, mostly a hole."""
+    """Extend `path` to `size` bytes by a hole."""
     with path.open("ab") as file:
         file.truncate(size)
 

@@ -1,4 +1,4 @@
-"""Every limit of size that SECURITY.md states, met and passed by one."""
+"""Size limits of SECURITY.md: inputs at a limit are read, larger ones refused."""
 
 import json
 import os
@@ -61,7 +61,7 @@ STATED = (
 
 def test_the_tested_limits_are_the_documented_ones():
     rows = re.findall(r"^  \| .*$", SECURITY, re.MULTILINE)
-    for row, stated in zip(rows[1:], STATED, strict=True):  # behind the head
+    for row, stated in zip(rows[1:], STATED, strict=True):  # after the head
         assert row.strip().endswith(stated)
     assert (MAX_ROWS, MAX_EVENTS, RECORD_LIMIT) == (300_000, 50_000, 16 * MIB)
     assert (LARGEST, MOST_BYTES) == (16 * MIB, 256 * MIB)
@@ -118,7 +118,7 @@ def test_a_record_and_a_chunk_have_a_size_limit(tmp_path):
 
 
 def test_reading_ends_at_chunks_that_unpack_too_large(tmp_path):
-    """Each holds one unknown record of 16 MiB, packed into less than a kilobyte."""
+    """Each chunk has one unknown record of 16 MiB, packed into less than a kilobyte."""
     content = b"\x99" + (16 * MIB - 9).to_bytes(8, "little") + bytes(16 * MIB - 9)
     data = with_chunk(zstandard.compress(content), 16 * MIB)
     chunk = span_of(data, CHUNK)
@@ -145,7 +145,7 @@ def test_chunks_may_unpack_up_to_the_limit(tmp_path):
 
 
 def test_a_trial_may_have_its_limit_of_cycles(tmp_path, monkeypatch):
-    """Of 50 cycles, with the limit put beside them."""
+    """A trial of 50 cycles, with limits of 50 and 49."""
     path = tmp_path / "T01.mcap"
     seal(write_trial(path, make_cycles(50)), "travel")
     reader = TrialReader(path)
@@ -156,7 +156,7 @@ def test_a_trial_may_have_its_limit_of_cycles(tmp_path, monkeypatch):
         TrialReader(path).cycles()
 
 
-# --- what a person writes -------------------------------------------------------------
+# --- settings and scripts -------------------------------------------------------------
 
 
 def test_a_text_may_have_its_size_limit(tmp_path):
@@ -177,7 +177,7 @@ READERS = {
 
 
 @pytest.mark.parametrize("name", READERS)
-def test_every_text_is_read_under_that_limit(tmp_path, name):
+def test_every_text_file_has_the_size_limit_of_a_text(tmp_path, name):
     (tmp_path / "rig.toml").write_text(load_settings(None).rig_text)
     (tmp_path / name).write_bytes(b"#" * 1_000_001)
     with pytest.raises(SettingsError, match="larger than 1 MB"):
@@ -237,9 +237,7 @@ def test_a_table_line_has_a_length_limit(tmp_path, length, is_read):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("count", "is_read"), [(2000, True), (2001, False)])
-def test_an_npz_with_many_trials_needs_little_memory(
-    tmp_path, monkeypatch, count, is_read
-):
+def test_an_npz_has_a_limit_of_trials(tmp_path, monkeypatch, count, is_read):
     monkeypatch.setattr(tables, "share_of_memory", lambda _, least: least)
     rows = np.column_stack([np.arange(5.0), np.ones(5), np.ones(5), np.ones(5)])
     path = tmp_path / "trials.npz"
@@ -263,7 +261,7 @@ def test_an_npz_is_limited_by_its_unpacked_size(tmp_path):
 
 
 def stored(path, *, terrains=1, points=2):
-    """Write a database of that many terrains, with that many speeds."""
+    """Write a database of `terrains` terrains, with `points` speeds."""
     content = json.loads(samples()["database"])
     content["axes"]["v_t"] = [0.1 * k for k in range(points)]
     terrain = content["terrains"].pop("S0")

@@ -1,4 +1,4 @@
-"""One hostile input, read in an empty folder: what it did."""
+"""Reads one hostile input in an empty folder and reports its effects."""
 
 import os
 import tempfile
@@ -11,14 +11,14 @@ from tests.corpus.readers import READERS
 
 
 @dataclass(frozen=True, slots=True)
-class GuardVerdict:
-    """What became of an input.
+class InputVerdict:
+    """Effects of an input.
 
     Attributes:
-        error: of what kind, and what it says; empty where it was read.
-        is_refused: the error is one that a person can act on.
-        seconds: of CPU.
-        strays: files that appeared outside of the folder.
+        error: kind and text of the error; empty if the input was read.
+        is_refused: whether the error is one that a person can act on.
+        seconds: CPU time.
+        strays: files that appeared outside the folder.
     """
 
     error: str
@@ -28,12 +28,12 @@ class GuardVerdict:
 
     @property
     def is_sound(self) -> bool:
-        """Whether it was read or refused, and nothing else happened."""
+        """Whether the input was read or refused, and nothing else happened."""
         return (not self.error or self.is_refused) and not self.strays
 
 
-def read(name: str, data: bytes) -> GuardVerdict:
-    """Read `data` by the reader `name` in a folder of its own."""
+def read(name: str, data: bytes) -> InputVerdict:
+    """Read `data` by the reader `name` in its own folder."""
     with tempfile.TemporaryDirectory(prefix="corpus-") as scratch:
         outside = Path(scratch)
         folder = outside / "deep" / "down" / "here"
@@ -51,6 +51,6 @@ def read(name: str, data: bytes) -> GuardVerdict:
         finally:
             os.chdir(before)
         seconds = time.process_time() - start
-        found = {path for path in outside.rglob("*") if path.is_file()}
-        strays = [path for path in found if folder not in path.parents]
-    return GuardVerdict(error, is_refused, seconds, tuple(map(str, sorted(strays))))
+        files = {path for path in outside.rglob("*") if path.is_file()}
+        strays = [path for path in files if folder not in path.parents]
+    return InputVerdict(error, is_refused, seconds, tuple(map(str, sorted(strays))))

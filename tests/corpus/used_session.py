@@ -29,12 +29,12 @@ COMMANDS = (
 
 
 class HalfDoneError(Exception):
-    """A command has left files that do not belong together, or has ended as a bug."""
+    """A command has left inconsistent files, or has ended as a bug."""
 
 
 @cache
 def session_files() -> dict[str, bytes]:
-    """Return the files of the data folder of the session, by their path below it."""
+    """Files of the data folder of the session, by their path below that folder."""
     with tempfile.TemporaryDirectory(prefix="corpus-") as scratch:
         data = Path(scratch)
         folder = create_session(data, "TF", is_simulated=True, utc_ns=1_800 * 10**15)
@@ -53,7 +53,7 @@ def session_files() -> dict[str, bytes]:
 
 
 def session_file(name: str) -> bytes:
-    """Return the file of the session whose path ends in `name`."""
+    """Content of the file of the session whose path ends in `name`."""
     (content,) = (c for path, c in session_files().items() if path.endswith(name))
     return content
 
@@ -72,7 +72,7 @@ def _record(journal: Journal, name: TrialName, verdict: Event) -> None:
 
 
 def lay_out(folder: Path) -> Path:
-    """Write the data with the session into `folder` and return that."""
+    """Write the data with the session into `folder`; the same folder."""
     for name, content in session_files().items():
         target = folder / name
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -84,7 +84,7 @@ def use(name: str, data: bytes, folder: Path) -> None:
     """Run commands on the session, with `data` in place of its file `name`.
 
     Raises:
-        HalfDoneError: one ended as a bug, or data and sidecar of a trial are apart.
+        HalfDoneError: a command ended as a bug, or recordings and sidecars disagree.
     """
     for path, content in session_files().items():
         target = folder / path
@@ -100,10 +100,10 @@ def use(name: str, data: bytes, folder: Path) -> None:
 
 
 def printed(*command: str) -> tuple[int, str]:
-    """Return the exit code of a command and what it printed, its errors if nothing.
+    """Exit code of a command and its output, or its errors if there is none.
 
     Raises:
-        HalfDoneError: it ended as a bug.
+        HalfDoneError: the command ended as a bug.
     """
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
@@ -114,13 +114,13 @@ def printed(*command: str) -> tuple[int, str]:
 
 
 def _sums(folder: Path) -> list[str]:
-    """Return the checksums of all trial files."""
+    """Checksums of all trial files."""
     paths = folder.rglob("*.mcap")
     return sorted(hashlib.sha256(path.read_bytes()).hexdigest() for path in paths)
 
 
 def _check_pairs(folder: Path, command: str) -> None:
-    """Require a sidecar beside every recording, and none without one."""
+    """Require a sidecar for every recording, and a recording for every sidecar."""
     for name in ("trials", "rejected"):
         files = list(folder.glob(f"sessions/*/{name}/T*"))
         recordings = {path.stem for path in files if path.suffix == ".mcap"}

@@ -1,7 +1,7 @@
 """Reads mutations in a process of limited memory: `python -m tests.corpus.worker`.
 
 Arguments: kind, first seed, count. Standard output has a line of JSON before each
-input, and one after each that did harm.
+input, and one after each harmful input.
 """
 
 import faulthandler
@@ -14,24 +14,24 @@ from tests.corpus.mutations import mutated
 from tests.corpus.samples import samples
 from tests.corpus.trial import read
 
-MEMORY = 300 * 2**20  # bytes of address space beside the libraries
+MEMORY = 300 * 2**20  # bytes of address space in addition to the libraries
 LONGEST = 10.0  # s; beyond it an input hangs
 
 
 def main(kind: str, seeds: range) -> None:
     """Read the mutations `seeds` of a kind."""
     sound = samples()[kind]
-    read(kind, sound)  # whatever it imports is no memory of an input
+    read(kind, sound)  # imports must not count as memory of an input
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     limit = pages * resource.getpagesize() + MEMORY
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
     for seed in seeds:
         say({"seed": seed})
         faulthandler.dump_traceback_later(LONGEST, exit=True)
-        found = read(kind, mutated(sound, seed))
+        verdict = read(kind, mutated(sound, seed))
         faulthandler.cancel_dump_traceback_later()
-        if not found.is_sound:
-            say({"error": found.error[:300], "strays": found.strays})
+        if not verdict.is_sound:
+            say({"error": verdict.error[:300], "strays": verdict.strays})
 
 
 def say(value: dict[str, object]) -> None:
