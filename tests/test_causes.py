@@ -93,7 +93,7 @@ CAUSES = {
     ),
     ("analysis/tables/other_formats.py", "this is an Excel workbook"): (
         "its first bytes, or [Content_Types].xml in its archive",
-        "borders/test_borders.py::test_what_is_given_is_read_exactly_flagged_or_refused",
+        "borders/test_borders.py::test_a_foreign_input_is_read_exactly_flagged_or_refused",
     ),
     ("acquisition/ipc/layout.py", "runs another version of this program"): (
         "size and digest of the layout in the other process's memory",

@@ -1,4 +1,4 @@
-"""Calls from a notebook, and names of files, at the edge of what they take."""
+"""Calls from a notebook, and names of files, at the border of valid input."""
 
 import os
 from collections.abc import Callable
@@ -38,7 +38,7 @@ def _refused(given: str, call: Callable[[Path], Any], says: str) -> Border:
 
 
 def _found(given: str, pattern: str) -> Border:
-    """Return a row of one file that is given by `pattern`, below the home folder."""
+    """A row of one file that is given by `pattern`, below the home folder."""
 
     def act(folder: Path) -> Answer:
         (folder / "trial.csv").write_text(text())

@@ -1,4 +1,4 @@
-"""Parquet and npz, and files of other kinds that are given for a table."""
+"""Parquet and npz, and files of other kinds that are given as a table."""
 
 import gzip
 import io
@@ -18,8 +18,8 @@ _READ, _FLAGGED, _REFUSED = Outcome.READ, Outcome.FLAGGED, Outcome.REFUSED
 
 
 def _columns(**others: Any) -> dict[str, Any]:
-    known = dict(zip(NAMES, VALUES.T, strict=True))
-    return {others.get(f"name_{n}", n): others.get(n, x) for n, x in known.items()}
+    columns = dict(zip(NAMES, VALUES.T, strict=True))
+    return {others.get(f"name_{n}", n): others.get(n, x) for n, x in columns.items()}
 
 
 def _parquet(

@@ -60,7 +60,7 @@ def _gap(seconds: float) -> tuple[list[list[str]], np.ndarray]:
 def _pushed(
     v: float = 1.0, F_n: float = 1.0, F_t: float = 1.0
 ) -> tuple[str, np.ndarray]:
-    """Return a table of a foot that slides, with factors, and its numbers."""
+    """A table of a foot that slides, with factors, and its numbers."""
     k = np.arange(200)
     rows = np.column_stack(
         [

@@ -1,4 +1,4 @@
-"""One row of the table of borders: what is given, and what has to come of it."""
+"""One row of the table of borders: an input and its expected outcome."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,20 +8,20 @@ from typing import NamedTuple
 
 
 class Outcome(Enum):
-    """What happens to something foreign; there is nothing else."""
+    """The possible outcomes of a foreign input."""
 
     READ = "read exactly"
     FLAGGED = "read exactly, flagged"
     REFUSED = "refused with cause"
-    WRONG = "read wrongly"  # what no row may expect
+    WRONG = "read wrongly"  # expected by no row
 
 
 class Answer(NamedTuple):
-    """What the program made of a row.
+    """Answer of the program to an input.
 
     Attributes:
-        outcome: of it.
-        words: what was said.
+        outcome: what happened to the input.
+        words: text of the answer.
     """
 
     outcome: Outcome
@@ -30,13 +30,13 @@ class Answer(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Border:
-    """Something foreign that is given to the program.
+    """A foreign input of the program.
 
     Attributes:
-        given: what, in words.
-        outcome: what has to happen.
-        says: words that have to be said.
-        act: gives it to the program, in an empty folder.
+        given: the input, in words.
+        outcome: expected outcome.
+        says: expected words of the answer.
+        act: gives the input to the program, in an empty folder.
     """
 
     given: str

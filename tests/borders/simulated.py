@@ -1,4 +1,4 @@
-"""The mark of simulated trials in tables, and tables of both kinds side by side."""
+"""The mark of simulated trials in tables, and tables of both kinds together."""
 
 import io
 from contextlib import redirect_stderr, redirect_stdout
@@ -59,12 +59,12 @@ def _loaded(folder: Path) -> Answer:
 
 
 def _fitted(folder: Path) -> Answer:
-    said = io.StringIO()
-    with redirect_stderr(said), redirect_stdout(said):
+    output = io.StringIO()
+    with redirect_stderr(output), redirect_stdout(output):
         code = main(["fit", *_both(folder), "--to", str(folder / "report")])
     is_refused = code == SettingsError.exit_code and not (folder / "report").exists()
     outcome = Outcome.REFUSED if is_refused else Outcome.WRONG
-    return Answer(outcome, " ".join(said.getvalue().split()))
+    return Answer(outcome, " ".join(output.getvalue().split()))
 
 
 SIMULATED: tuple[Border, ...] = (

@@ -1,4 +1,4 @@
-"""What other programs and people give to this one, and what has to happen."""
+"""Inputs from other programs and people, and their expected outcomes."""
 
 import resource
 import warnings
@@ -20,11 +20,11 @@ SUBJECTS: dict[str, tuple[Border, ...]] = {
     "Simulated and recorded": SIMULATED,
     "Calls and names of files": CALLS,
 }
-_MOST_KB = 500_000  # that a row may add to the most memory ever held
+_MAX_KB = 500_000  # that a row may add to the peak memory
 
 
 def border_attacks() -> list[Attack]:
-    """Return every row."""
+    """Every row of every subject."""
     return [_attack(subject, row) for subject, rows in SUBJECTS.items() for row in rows]
 
 
@@ -35,7 +35,7 @@ def _attack(subject: str, row: Border) -> Attack:
             warnings.simplefilter("error")
             answer = row.act(folder)
         after_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        assert after_kb - before_kb < _MOST_KB
+        assert after_kb - before_kb < _MAX_KB
         assert answer.outcome is row.outcome, answer.words
         assert row.says in answer.words
 

@@ -1,4 +1,4 @@
-"""Tables that rows of the border are made of, and how they are given."""
+"""Tables of the rows of borders, and how the program is given them."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -32,13 +32,13 @@ VALUES = np.array(ROWS, dtype=np.float64)
 def text(
     rows: Cells = ROWS, delimiter: str = ",", names: Sequence[str] = NAMES, mark="."
 ) -> str:
-    """Return a table as text."""
+    """A table as text."""
     lines = [delimiter.join(cell.replace(".", mark) for cell in row) for row in rows]
     return "\n".join([delimiter.join(names), *lines]) + "\n"
 
 
 def with_column(column: int, change: Callable[[int, str], str]) -> list[list[str]]:
-    """Return the rows with another column."""
+    """The rows with one column changed."""
     return [
         [*row[:column], change(k, row[column]), *row[column + 1 :]]
         for k, row in enumerate(ROWS)
@@ -46,12 +46,12 @@ def with_column(column: int, change: Callable[[int, str], str]) -> list[list[str
 
 
 def with_cell(row: int, column: int, cell: str) -> list[list[str]]:
-    """Return the rows with one other cell."""
+    """The rows with one cell changed."""
     return with_column(column, lambda k, old: cell if k == row else old)
 
 
 def values(**columns: np.ndarray) -> np.ndarray:
-    """Return the numbers with other columns."""
+    """The numbers with some columns replaced."""
     changed = VALUES.copy()
     for name, column in columns.items():
         changed[:, NAMES.index(name)] = column
@@ -59,14 +59,14 @@ def values(**columns: np.ndarray) -> np.ndarray:
 
 
 def without(*rows: int) -> np.ndarray:
-    """Return the numbers without some rows."""
+    """The numbers without some rows."""
     return np.delete(VALUES, rows, axis=0)
 
 
 def judged(
     load: Callable[[], Any], expected: np.ndarray | None, doubts: bool
 ) -> Answer:
-    """Return what came of reading one trial."""
+    """Answer of the program that reads one trial."""
     try:
         ((series,),) = load().values()
     except SettingsError as error:
@@ -94,7 +94,7 @@ def table(
     doubts: bool = False,
     **options: Any,
 ) -> Border:
-    """Return a row of a file with this content."""
+    """A row of a file with this content."""
 
     def act(folder: Path) -> Answer:
         path = folder / file
@@ -105,10 +105,10 @@ def table(
 
 
 def refused(given: str, content: str | bytes, says: str, **options: Any) -> Border:
-    """Return a row of a file that is refused."""
+    """A row of a file that is refused."""
     return table(given, content, Outcome.REFUSED, says, **options)
 
 
 def flagged(given: str, content: str | bytes, says: str, **options: Any) -> Border:
-    """Return a row of a file that is read, and flagged."""
+    """A row of a file that is read, and flagged."""
     return table(given, content, Outcome.FLAGGED, says, **options)

@@ -1,4 +1,4 @@
-"""Nothing foreign is read wrongly or in silence; the table says what happens."""
+"""No foreign input is read wrongly, or changed without a message."""
 
 import pytest
 
@@ -10,14 +10,14 @@ ROWS = [row for rows in SUBJECTS.values() for row in rows]
 
 
 @pytest.mark.parametrize("row", parameters(border_attacks()))
-def test_what_is_given_is_read_exactly_flagged_or_refused(row, tmp_path):
+def test_a_foreign_input_is_read_exactly_flagged_or_refused(row, tmp_path):
     row.check(tmp_path)
 
 
-def test_no_row_may_be_read_wrongly():
+def test_no_row_expects_a_wrong_reading():
     assert all(row.outcome is not Outcome.WRONG for row in ROWS)
 
 
-def test_what_is_flagged_or_refused_by_a_file_says_its_cause():
+def test_every_flagged_or_refused_row_states_its_cause():
     silent = [r.given for r in ROWS if r.outcome is not Outcome.READ and not r.says]
     assert silent == []
