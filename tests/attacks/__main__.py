@@ -29,7 +29,7 @@ HAZARDS = "hazards"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print or run a table; return the exit code."""
+    """Print or run a table; the exit code."""
     options = _options().parse_args(arguments)
     if options.to is not None:
         for name in (*TABLES, HAZARDS):
@@ -76,7 +76,7 @@ def _options() -> argparse.ArgumentParser:
 
 
 def markdown(rows: Sequence[Attack]) -> Iterator[str]:
-    """Yield the lines of a table."""
+    """Lines of a table in Markdown."""
     yield "| what is done | when | what must hold | run by |"
     yield "| --- | --- | --- | --- |"
     for row in rows:
@@ -86,7 +86,7 @@ def markdown(rows: Sequence[Attack]) -> Iterator[str]:
 
 
 def _run(table: str, numbers: Sequence[int], jobs: int) -> int:
-    """Run rows of a table; return how many failed."""
+    """Run rows of a table; the number of failed ones."""
     failed = 0
     with ProcessPoolExecutor(jobs) as pool:
         outcomes = pool.map(_outcome, [table] * len(numbers), numbers)
@@ -106,7 +106,7 @@ def _rows(table: str) -> Sequence[Attack]:
 
 
 def _outcome(table: str, number: int) -> tuple[str, str]:
-    """Run one row in a process of the pool; return its name and what did not hold."""
+    """Run one row in a process of the pool; its name and its problem."""
     row = _rows(table)[number]
     with tempfile.TemporaryDirectory(prefix="attack-") as folder:
         try:

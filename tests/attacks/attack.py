@@ -22,8 +22,8 @@ class Attack:
         done: what is done, in the words of an engineer of the arm.
         when: the phase, delay, place or seeds.
         holds: what must hold afterwards.
-        check: does it in an empty folder; raises `AssertionError` where it does not
-            hold.
+        check: attacks in an empty folder; raises `AssertionError` if the claim does
+            not hold.
         run_by: the first command that runs it.
         seconds: longest time on a busy machine [s].
         on_wall_clock: starts processes; nothing else may run meanwhile.

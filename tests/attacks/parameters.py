@@ -14,7 +14,7 @@ _MARKS = {
 
 
 def parameters(rows: Iterable[Attack]) -> list:
-    """Return a parameter `row` for each."""
+    """A parameter `row` for each row."""
     return [pytest.param(row, id=str(row), marks=_marks_of(row)) for row in rows]
 
 

@@ -1,4 +1,4 @@
-"""The tables of attacks are whole, and the command prints and runs them."""
+"""The tables of attacks are complete, and the command prints and runs them."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from tests.attacks.tables import TABLES
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_rows_are_told_apart_and_say_what_must_hold(name):
+def test_rows_have_unique_names_and_state_what_must_hold(name):
     rows = TABLES[name]()
     assert len({str(row) for row in rows}) == len(rows)
     assert all(row.done and row.holds for row in rows)
@@ -39,9 +39,9 @@ def test_a_row_that_does_not_hold_is_printed_and_the_command_fails(monkeypatch, 
     ]
     monkeypatch.setitem(TABLES, "faults", lambda: rows)
     assert main(["faults", "--run"]) == 1
-    said = capsys.readouterr().out
-    assert "puck silent, ready: broken, line" in said
-    assert "the arm was driven" in said
-    assert "OSError: no such bus" in said
-    assert "3 rows of faults, 2 failed" in said
+    out = capsys.readouterr().out
+    assert "puck silent, ready: broken, line" in out
+    assert "the arm was driven" in out
+    assert "OSError: no such bus" in out
+    assert "3 rows of faults, 2 failed" in out
     assert main(["faults", "--run", "--only", "stop"]) == 0
