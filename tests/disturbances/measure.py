@@ -1,4 +1,4 @@
-"""What becomes of disturbed trials, by the path that a user's data take."""
+"""Outcomes of disturbed trials, on the path that a user's data take."""
 
 import tarfile
 from collections.abc import Iterator
@@ -39,13 +39,13 @@ TRIALS = {"S0": "S0/00", "TF": "TF/05"}
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
-    """What became of a disturbed trial.
+class Observation:
+    """Observed outcome of a disturbed trial.
 
     Attributes:
-        outcome: whether it was refused or flagged; harmless where nothing was said.
-        words: what was said.
-        changed: share by which F_t/F_n is another; 0 where there is none.
+        outcome: refused or flagged; harmless if there was no message.
+        words: text of the message.
+        changed: share by which F_t/F_n changed; 0 without a ratio.
     """
 
     outcome: Outcome
@@ -54,7 +54,7 @@ class Seen:
 
 
 def disturbance_attacks() -> list[Attack]:
-    """Return every row, of tables and of recordings."""
+    """Every row, of tables and of recordings."""
     return [*map(_table_attack, TABLES), *map(_recording_attack, RECORDINGS)]
 
 
@@ -79,7 +79,7 @@ def _holds(row: TableRow | RecordingRow) -> str:
     return f"{row.outcome.value}: {row.word}"
 
 
-def _compare(row: TableRow | RecordingRow, seen: Seen) -> None:
+def _compare(row: TableRow | RecordingRow, seen: Observation) -> None:
     assert seen.outcome is row.outcome, seen
     if isinstance(row.word, float):
         assert seen.changed <= row.word + 1e-9, seen
@@ -87,8 +87,8 @@ def _compare(row: TableRow | RecordingRow, seen: Seen) -> None:
         assert row.word in seen.words, seen
 
 
-def see_table(row: TableRow) -> Seen:
-    """Return what becomes of a table, as `traction fit` reads and doubts it."""
+def see_table(row: TableRow) -> Observation:
+    """Outcome of a table, as `traction fit` reads and doubts the table."""
     with np.load(DATA / "rehearsal_slice.npz") as arrays:
         table = arrays[TRIALS[row.terrain]].astype(float)
     with TemporaryDirectory() as folder:
@@ -96,17 +96,17 @@ def see_table(row: TableRow) -> Seen:
             words, ratio = _fitted(Path(folder), row.disturb(table.copy()), row)
         except TractionError as error:
             words = f"{error.message} {error.hint or ''}".replace(f"{folder}/", "")
-            return Seen(Outcome.REFUSED, words.strip(), 0.0)
+            return Observation(Outcome.REFUSED, words.strip(), 0.0)
         _, before = _fitted(Path(folder), table, None)
     outcome = Outcome.FLAGGED if words else Outcome.HARMLESS
-    return Seen(outcome, words, abs(ratio / before - 1.0))
+    return Observation(outcome, words, abs(ratio / before - 1.0))
 
 
 def _fitted(folder: Path, table: Array, row: TableRow | None) -> tuple[str, float]:
-    """Return (what is said of a table, F_t/F_n).
+    """(messages about a table, F_t/F_n).
 
     Raises:
-        TractionError: it is refused.
+        TractionError: the table is refused.
     """
     if row is not None and row.header:
         path = folder / "table.csv"
@@ -124,7 +124,7 @@ def _fitted(folder: Path, table: Array, row: TableRow | None) -> tuple[str, floa
 
 @contextmanager
 def recorded_trial() -> Iterator[Path]:
-    """Unpack a trial of the recorded session."""
+    """A trial of the recorded session, unpacked."""
     with TemporaryDirectory() as folder:
         with tarfile.open(RECORDED) as archive:
             archive.extractall(folder, filter="data")
@@ -132,8 +132,8 @@ def recorded_trial() -> Iterator[Path]:
         yield min(path for path in paths if "truth" not in path.name)
 
 
-def see_recording(row: RecordingRow, source: Path) -> Seen:
-    """Return what becomes of a recorded trial, as the review shows it."""
+def see_recording(row: RecordingRow, source: Path) -> Observation:
+    """Outcome of a recorded trial, as shown by the review."""
     trial, before = load_trial(source), review_trial(source)
     recording = row.disturb(
         Recording(
@@ -155,14 +155,14 @@ def see_recording(row: RecordingRow, source: Path) -> Seen:
         try:
             after = review_trial(path)
         except TractionError as error:
-            return Seen(Outcome.REFUSED, error.message, 0.0)
-    said = [text for mark, text in after.lines() if mark != GOOD]
+            return Observation(Outcome.REFUSED, error.message, 0.0)
+    messages = [text for mark, text in after.lines() if mark != GOOD]
     usual = {_check(text) for mark, text in before.lines() if mark != GOOD}
-    new = [text for text in said if _check(text) not in usual]
+    new = [text for text in messages if _check(text) not in usual]
     outcome = Outcome.FLAGGED if new else Outcome.HARMLESS
-    return Seen(outcome, "; ".join(new), abs(after.ratio / before.ratio - 1.0))
+    return Observation(outcome, "; ".join(new), abs(after.ratio / before.ratio - 1.0))
 
 
 def _check(text: str) -> str:
-    """Return which check of the review says `text`: its first word."""
+    """The check of the review that gives `text`: its first word."""
     return text.split(maxsplit=1)[0]

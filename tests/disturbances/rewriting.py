@@ -1,4 +1,4 @@
-"""A recorded trial written once more, with other cycles or attachments."""
+"""Rewrites a recorded trial with other cycles or attachments."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,10 +20,10 @@ def rewrite(
 
     Args:
         source: the other trial.
-        path: where to.
-        cycles: of the new one.
-        attachments: in the place of those of the other.
-        stated: metadata of the trial in the place of the other's.
+        path: file to write.
+        cycles: cycles of the new trial.
+        attachments: replacements of the other trial's attachments.
+        stated: replacements of the other trial's metadata.
     """
     reader = TrialReader(source)
     clock = reader.metadata["clock"]

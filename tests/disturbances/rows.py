@@ -1,4 +1,4 @@
-"""What can be wrong with a trial, and what has to come of it: one table."""
+"""Disturbances of a trial and their expected outcomes, as one table."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -14,7 +14,7 @@ T, V, N, F = range(4)  # columns of a table
 
 
 class Outcome(Enum):
-    """What becomes of a disturbed trial."""
+    """Outcome of a disturbed trial."""
 
     REFUSED = "refused"
     FLAGGED = "flagged"
@@ -37,12 +37,12 @@ class TableRow:
 
     Attributes:
         name: what is wrong.
-        disturb: what it does to a table (n, 4).
-        outcome: what has to come of it.
-        word: in the refusal or the warning; of a harmless one the largest share by
-            which F_t/F_n may change.
-        terrain: whose trial is disturbed.
-        header: of the table, where it is a CSV.
+        disturb: changes a table, shape (n, 4).
+        outcome: expected outcome.
+        word: word of the refusal or the warning; for a harmless disturbance the largest
+            share by which F_t/F_n may change.
+        terrain: terrain whose trial is disturbed.
+        header: header of the table, if it is a CSV.
     """
 
     name: str
@@ -64,7 +64,7 @@ class RecordingRow:
 
 
 def times(column: int, factor: float) -> Callable[[Array], Array]:
-    """Return what multiplies a column."""
+    """A disturbance that multiplies a column."""
 
     def disturb(table: Array) -> Array:
         table[:, column] *= factor
@@ -74,7 +74,7 @@ def times(column: int, factor: float) -> Callable[[Array], Array]:
 
 
 def late(rows: int) -> Callable[[Array], Array]:
-    """Return what brings the forces later by so many rows of 2 ms."""
+    """A disturbance that delays the forces by `rows` rows of 2 ms."""
     return lambda table: np.column_stack([table[rows:, :2], table[:-rows, 2:]])
 
 
@@ -84,25 +84,25 @@ def swapped(table: Array) -> Array:
 
 
 def jumped(table: Array) -> Array:
-    """Let the clock jump by a second in the middle."""
+    """Make the clock jump by a second in the middle."""
     table[len(table) // 2 :, T] += 1.0
     return table
 
 
 def backward(table: Array) -> Array:
-    """Let the clock go back by a second in the middle."""
+    """Set the clock back by a second in the middle."""
     table[len(table) // 2 :, T] -= 1.0
     return table
 
 
 def clipped(table: Array) -> Array:
-    """Let the sensor end at a third of its largest traction."""
+    """Clip the sensor at a third of its largest traction."""
     table[:, F] = np.minimum(table[:, F], table[:, F].max() / 3.0)
     return table
 
 
-def spoilt(table: Array) -> Array:
-    """Lose every tenth row."""
+def with_gaps(table: Array) -> Array:
+    """Remove the F_t of every tenth row."""
     table[::10, F] = np.nan
     return table
 
@@ -127,7 +127,7 @@ TABLES = (
     TableRow("force 500 ms late", late(250), FLAGGED, "lag=50"),
     TableRow("clock jumps by 1 s", jumped, FLAGGED, "gap of 1"),
     TableRow("clock goes back by 1 s", backward, REFUSED, "time does not increase"),
-    TableRow("every tenth row is no number", spoilt, FLAGGED, "without a value"),
+    TableRow("every tenth row is no number", with_gaps, FLAGGED, "without a value"),
     TableRow("each row twice", lambda x: np.repeat(x, 2, 0), FLAGGED, "duplicate rows"),
     TableRow("zeros", lambda x: x * [1.0, 0, 0, 0], REFUSED, "No sample"),
     TableRow("five rows", lambda x: x[:5], REFUSED, "No sample"),
@@ -150,7 +150,7 @@ TABLES = (
 
 
 def turned(degrees: float) -> Callable[[Recording], Recording]:
-    """Return what turns the sensor about its z axis; it was tared like this."""
+    """A disturbance that turns the sensor about its z axis, also during the tare."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     once = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     both = np.kron(np.eye(2), once)
@@ -164,7 +164,7 @@ def turned(degrees: float) -> Callable[[Recording], Recording]:
 
 
 def heavier(share: float) -> Callable[[Recording], Recording]:
-    """Return what makes the foot heavier than rig.toml says; the tare was taken so."""
+    """A disturbance that makes the foot heavier than stated, also during the tare."""
 
     def disturb(recording: Recording) -> Recording:
         payload = recording.payload
@@ -179,7 +179,7 @@ def heavier(share: float) -> Callable[[Recording], Recording]:
 
 
 def moved(**changes: float) -> Callable[[Recording], Recording]:
-    """Return what enters the container wrong: incline or heading [degrees]."""
+    """A disturbance that enters the container wrong: incline or heading [degrees]."""
 
     def disturb(recording: Recording) -> Recording:
         frame = recording.frame
@@ -193,20 +193,20 @@ def moved(**changes: float) -> Callable[[Recording], Recording]:
 
 
 def longer(height: float) -> Callable[[Recording], Recording]:
-    """Return what mounts a foot that is longer than the one that is entered [m]."""
+    """A disturbance that mounts a foot longer than entered by `height` [m]."""
     lower = np.array([0.0, 0.0, height])
     return lambda recording: replace(recording, sole=recording.sole - lower)
 
 
 def tared_on_the_ground(recording: Recording) -> Recording:
-    """Let the foot have stood on the ground with 8 N when it was tared."""
+    """Tare the foot while it stands on the ground with 8 N."""
     bias = recording.payload.bias.copy()
     bias[2] -= 8.0 * recording.payload.sign
     return replace(recording, payload=replace(recording.payload, bias=bias))
 
 
 def of_cycles(change: Callable[[Record], None]) -> Callable[[Recording], Recording]:
-    """Return a disturbance of the cycles."""
+    """A disturbance of the cycles."""
 
     def disturb(recording: Recording) -> Recording:
         cycles = recording.cycles.copy()
