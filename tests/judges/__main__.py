@@ -1,7 +1,7 @@
 """Run every set of real data against its right answers: `python -m tests.judges`.
 
-Reads ../shared/data/real, or the folder that is named, and prints value, right answer
-and verdict; ends with 1 where a verdict is wrong, and with 75 where there are no data.
+Reads ../shared/data/real, or the given folder, and prints value, right answer and
+verdict; ends with 1 if a verdict is wrong, and with 75 if there are no data.
 """
 
 import argparse
@@ -15,7 +15,7 @@ NO_DATA = 75
 
 
 def main(arguments: list[str]) -> int:
-    """Print the judgements and return the exit code."""
+    """Print the judgements; the exit code."""
     parser = argparse.ArgumentParser(prog="python -m tests.judges")
     parser.add_argument("folder", nargs="?", type=Path, default=REAL)
     parser.add_argument("--sets", default=",".join(SETS), help="only these")

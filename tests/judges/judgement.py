@@ -1,4 +1,4 @@
-"""What the program says of a set of measurements, and what is right."""
+"""Answers of the program about a set of measurements, compared with the right ones."""
 
 from dataclasses import dataclass
 
@@ -9,10 +9,10 @@ class Judgement:
 
     Attributes:
         of: name of the set.
-        what: was asked.
-        value: that the program gives, or how it refuses.
-        right: what is right.
-        is_right: whether the value is.
+        what: quantity or question.
+        value: value given by the program, or its refusal.
+        right: right value.
+        is_right: whether the value is right.
     """
 
     of: str
@@ -39,10 +39,10 @@ def at_most(of, what, value, most, unit="") -> Judgement:
     return Judgement(of, what, text, f"<= {most:g} {unit}".rstrip(), value <= most)
 
 
-def said(of, what, text, words) -> Judgement:
-    """Judge whether a text says all of `words`; it is shown around the first one."""
-    is_said = all(word in text for word in words)
+def says(of, what, text, words) -> Judgement:
+    """Judge whether a text says all `words`; shows the text around the first."""
+    is_contained = all(word in text for word in words)
     plain = " ".join(text.split())
     begin = max(plain.find(words[0]) - 60, 0)
     shown = plain[begin : begin + 150] or "plain success"
-    return Judgement(of, what, shown, f"says {', '.join(words)}", is_said)
+    return Judgement(of, what, shown, f"says {', '.join(words)}", is_contained)

@@ -17,7 +17,7 @@ from analysis.tables.loading import load_tables
 from ft_sensor.payload import Payload
 from tests.analysis.tables.stated_dialects import STATED
 from tests.experiments.program import traction
-from tests.judges.judgement import Judgement, at_most, near, said
+from tests.judges.judgement import Judgement, at_most, near, says
 from wam.model.arm_model import ArmModel
 from wam.model.constants import load_constants
 from wam.model.tool import Tool, sensor_body
@@ -36,9 +36,9 @@ def cmu_steady(folder: Path) -> Iterator[Judgement]:
         asked = ("fit", folder / "law.npz", *form, "--models", _MODELS, "--to", out)
         done = traction(*asked)
         fits = json.loads((Path(out) / "fits.json").read_text())["terrains"]
-    yield said(of, "rows that are conditions", done.out, ["rows are conditions"])
-    yield said(of, "rate that is not 500 Hz", done.out, ["1 Hz: nothing is smoothed"])
-    yield said(of, "ratios of 2 to 3", done.out, ["mu is a poor summary here"])
+    yield says(of, "rows that are conditions", done.out, ["rows are conditions"])
+    yield says(of, "rate that is not 500 Hz", done.out, ["1 Hz: nothing is smoothed"])
+    yield says(of, "ratios of 2 to 3", done.out, ["mu is a poor summary here"])
     yield Judgement(
         of,
         "a wrong unit is not suspected",
@@ -55,7 +55,7 @@ def cmu_steady(folder: Path) -> Iterator[Judgement]:
 
 
 def cmu_press(folder: Path) -> Iterator[Judgement]:
-    """Judge presses: nothing of the program calls itself a law of sinkage."""
+    """Judge presses: the program offers no law of sinkage."""
     of = "cmu_press"
     with tempfile.TemporaryDirectory() as out:
         done = traction(
@@ -66,7 +66,7 @@ def cmu_press(folder: Path) -> Iterator[Judgement]:
             "--to",
             Path(out) / "fit",
         )
-    yield said(of, "a press has no velocity", done.err, ["no column", "v_t"])
+    yield says(of, "a press has no velocity", done.err, ["no column", "v_t"])
     yield near(of, "exit code", done.code, 2, 0)
     helped = traction("--help").out.lower()
     words = [word for word in ("bekker", "sinkage", "kphi") if word in helped]
@@ -84,14 +84,14 @@ def cmu_raw_bag(folder: Path) -> Iterator[Judgement]:
     of = "cmu_raw_bag"
     bag = folder / "press.bag"
     listed = traction("import", bag, "--list").out
-    yield said(of, "--list", listed, ["rokubimini_msgs/Reading", "2113 messages"])
+    yield says(of, "--list", listed, ["rokubimini_msgs/Reading", "2113 messages"])
     request = _stated(bag, folder.parent / "robot_leg" / "robot.urdf")
     text = _refusal(request)
-    yield said(of, "import", text, ["no topics of sensor_msgs/JointState"])
+    yield says(of, "import", text, ["no topics of sensor_msgs/JointState"])
 
 
 def _stated(log: Path, urdf: Path) -> ImportRequest:
-    """What README says of the leg."""
+    """Import request with the values of the README of the leg."""
     return ImportRequest(
         log,
         urdf,
@@ -112,8 +112,8 @@ def robot_leg(folder: Path) -> Iterator[Judgement]:
     of = "robot_leg"
     truth = np.genfromtxt(folder / "truth.csv", delimiter=",", names=True)
     request = _stated(folder / "log.bag", folder / "robot.urdf")
-    found = import_log(request)
-    (trial,) = found.trials
+    result = import_log(request)
+    (trial,) = result.trials
     for other in ("log_mcap", "log_db3"):
         (same,) = import_log(replace(request, log=folder / other)).trials
         is_same = all(
@@ -122,8 +122,8 @@ def robot_leg(folder: Path) -> Iterator[Judgement]:
         )
         text = "equal" if is_same else "different"
         yield Judgement(of, f"{other} bit for bit", text, "equal", is_same)
-    named = "; ".join(found.warnings) or "nothing"
-    yield Judgement(of, "warned of", named, "nothing", not found.warnings)
+    named = "; ".join(result.warnings) or "nothing"
+    yield Judgement(of, "warned of", named, "nothing", not result.warnings)
     t = trial.t + trial.start
     sound = np.isfinite(trial.traction).all(axis=1)
     t, values = t[sound], trial.traction[sound]
@@ -139,7 +139,7 @@ def robot_leg(folder: Path) -> Iterator[Judgement]:
     yield at_most(of, "v_t, rms", _rms(v_t) * 1e3, 1.0, "mm/s")
     yield at_most(of, "F_n, rms away from starts and stops", _rms(F_n[calm]), 0.05, "N")
     yield at_most(of, "F_t, rms away from starts and stops", _rms(F_t[calm]), 0.05, "N")
-    checks = {check.name: check for check in found.checks}
+    checks = {check.name: check for check in result.checks}
     lag = checks["lag"]
     yield near(of, "lag shown", lag.shown[0], 18.0, 5.0, "ms")
     is_inside = lag.spread[0] <= 18.0 <= lag.spread[1]
@@ -161,13 +161,13 @@ def robot_leg(folder: Path) -> Iterator[Judgement]:
         ("wrong lag", {"lag": 0.06}, ["--lag 60 ms; starts and stops show"]),
         ("forgotten weight", {"mass": 0.0}, ["--tool-mass 0", "mass"]),
     ):
-        yield said(of, what, _refusal(replace(request, **changed)), words)
+        yield says(of, what, _refusal(replace(request, **changed)), words)
     for axes, text in _exchanged(folder, request):
-        yield said(of, f"exchanged axes, {axes}", text, ["axes"])
+        yield says(of, f"exchanged axes, {axes}", text, ["axes"])
 
 
 def _exchanged(folder: Path, request: ImportRequest) -> Iterator[tuple[str, str]]:
-    """Give what is said where the sensor's frame is turned by 90 degrees."""
+    """(axes, refusal) of imports whose sensor frame is turned by 90 degrees."""
     text = (folder / "robot.urdf").read_text()
     right = 'rpy="3.14159265358979 0 0"'
     assert right in text
@@ -183,7 +183,7 @@ def _exchanged(folder: Path, request: ImportRequest) -> Iterator[tuple[str, str]
 
 
 def csv_dialects(folder: Path) -> Iterator[Judgement]:
-    """Judge sixteen dialects."""
+    """Judge the reading of sixteen CSV dialects."""
     of = "csv_dialects"
     for name, wanted in json.loads((folder / "expected.json").read_text()).items():
         stated = STATED.get(name, {})
@@ -210,8 +210,8 @@ def granular_press_ft(folder: Path) -> Iterator[Judgement]:
         return np.loadtxt(folder / f"{name}.csv", delimiter=",", skiprows=1)[:, 2:]
 
     bias = table("zero").mean(axis=0)
-    for axis, found, right in zip("xyz", bias[:3], (6.9, 42.1, 3.5), strict=True):
-        yield near(of, f"tare {axis}", found, right, 0.15, "N")
+    for axis, result, right in zip("xyz", bias[:3], (6.9, 42.1, 3.5), strict=True):
+        yield near(of, f"tare {axis}", result, right, 0.15, "N")
     payload = Payload(0.0, np.zeros(3), np.eye(3), -1.0, bias)
     for name, right in (("smooth_1", 331.0), ("smooth_2", 305.0)):
         raw = table(f"{name}_press")
@@ -260,7 +260,7 @@ def _rms(x: np.ndarray) -> float:
 
 
 def _refusal(request: ImportRequest) -> str:
-    """Return how an import is refused, or what is warned of; "" for plain success."""
+    """Refusal or warnings of an import; "" for plain success."""
     try:
         return " ".join(import_log(request).warnings)
     except SettingsError as error:

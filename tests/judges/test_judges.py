@@ -1,9 +1,9 @@
-"""The judges judge: a wrong value is called wrong, and every set has one."""
+"""A wrong value is called wrong, and every set of data has a judge."""
 
 import pytest
 
 from tests.judges.__main__ import NO_DATA, main
-from tests.judges.judgement import at_most, near, said
+from tests.judges.judgement import at_most, near, says
 from tests.judges.sets import SETS
 
 
@@ -13,8 +13,8 @@ def test_a_wrong_value_is_called_wrong():
     assert not near("set", "value", float("nan"), 1.1, 0.05).is_right
     assert at_most("set", "value", 1.0, 1.0).is_right
     assert not at_most("set", "value", 1.01, 1.0).is_right
-    assert said("set", "text", "a b", ["a", "b"]).is_right
-    wrong = said("set", "text", "", ["a"])
+    assert says("set", "text", "a b", ["a", "b"]).is_right
+    wrong = says("set", "text", "", ["a"])
     assert not wrong.is_right
     assert wrong.line().startswith("WRONG")
     assert "plain success" in wrong.line()
