@@ -1,4 +1,4 @@
-"""A session of two trials and its tables, in a folder as a person works in."""
+"""A session of two trials and its tables, in a working folder."""
 
 import shutil
 
@@ -9,7 +9,7 @@ from tests.experiments.program import traction
 
 @pytest.fixture(scope="session")
 def workplace(recorded, tmp_path_factory):
-    """Return a folder with data/ of session S001 and its tables in tables/."""
+    """A folder with data/ of session S001 and its tables in tables/."""
     folder = tmp_path_factory.mktemp("workplace")
     shutil.copytree(recorded.data, folder / "data")
     data = folder / "data"

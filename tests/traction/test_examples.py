@@ -1,4 +1,4 @@
-"""Every example in the documentation of the public package runs as it is printed."""
+"""Every example in the documentation of the public package runs as printed."""
 
 import doctest
 import importlib
@@ -20,9 +20,9 @@ FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
         ("models", 3),
     ],
 )
-def test_examples_of_a_module_print_what_they_say(module, least):
-    found = importlib.import_module(f"traction.{module}")
-    parts = [test for test in doctest.DocTestFinder().find(found) if test.examples]
+def test_examples_of_a_module_give_their_documented_output(module, least):
+    imported = importlib.import_module(f"traction.{module}")
+    parts = [test for test in doctest.DocTestFinder().find(imported) if test.examples]
     assert len(parts) >= least
     runner = doctest.DocTestRunner(optionflags=FLAGS)
     for test in parts:
@@ -30,7 +30,7 @@ def test_examples_of_a_module_print_what_they_say(module, least):
     assert runner.summarize(verbose=False).failed == 0
 
 
-def test_the_page_for_notebooks_runs_as_it_is(tmp_path, monkeypatch, workplace):
+def test_the_example_of_the_notebook_page_runs(tmp_path, monkeypatch, workplace):
     page = ROOT / "docs" / "notebook.md"
     block, *_ = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
     for name in ("data", "tables"):
@@ -40,7 +40,7 @@ def test_the_page_for_notebooks_runs_as_it_is(tmp_path, monkeypatch, workplace):
     assert {path.name for path in tmp_path.glob("*.pdf")} == {"T01.pdf", "session.pdf"}
 
 
-def test_the_example_of_the_readme_runs_as_it_is(tmp_path, monkeypatch, workplace):
+def test_the_example_of_the_readme_runs(tmp_path, monkeypatch, workplace):
     page = ROOT / "README.md"
     (block,) = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
     (tmp_path / "demo").symlink_to(workplace / "data")

@@ -27,9 +27,9 @@ def test_the_example_of_the_page_runs_on_a_table(tmp_path, monkeypatch, capsys):
     (tmp_path / "trials.npz").symlink_to(SLICE)
     monkeypatch.chdir(tmp_path)
     exec(compile(block, str(PAGE), "exec"), {})
-    said = capsys.readouterr().out.splitlines()
-    assert "'mu'" in said[0]
-    assert [line[0] for line in said[-3:]] == ["1", "2", "3"]
+    lines = capsys.readouterr().out.splitlines()
+    assert "'mu'" in lines[0]
+    assert [line[0] for line in lines[-3:]] == ["1", "2", "3"]
 
 
 @pytest.mark.parametrize("model", ["tustin", "gp_se"])
@@ -43,7 +43,7 @@ def test_models_of_a_plate_follow_its_samples(tables, model):
     assert (answer.sd > 0).all()
 
 
-def test_forces_from_rest_are_those_of_the_kinds_that_are_given(tables):
+def test_break_away_models_depend_on_the_given_kinds_of_ground(tables):
     trials = [*tables.on("S0"), *tables.on("B0")]
     few = BreakAwayOptions(draws=10)
     stones = tr.fit_break_away(trials, options=few)

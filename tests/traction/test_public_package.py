@@ -1,4 +1,4 @@
-"""What a scientist does with `import traction`: load, look, tabulate, plot, fit."""
+"""`import traction` loads, tabulates, plots and fits trials."""
 
 import inspect
 import subprocess
@@ -32,7 +32,7 @@ def tables(workplace):
     return tr.load_tables(workplace / "tables")
 
 
-def test_every_public_name_is_there_and_documented():
+def test_every_public_name_exists_and_is_documented():
     for name in tr.__all__:
         assert inspect.getdoc(getattr(tr, name)), name
 
@@ -41,7 +41,7 @@ def test_the_version_is_that_of_the_distribution():
     assert tr.__version__ == metadata.version("traction")
 
 
-def test_a_short_text_stands_for_a_trial_and_for_a_session(session):
+def test_a_session_a_trial_and_a_model_have_a_short_repr(session):
     for text in (repr(session), repr(session[0]), repr(tr.fit(session, "tustin"))):
         assert len(text) < 160
         assert "\n" not in text
@@ -58,12 +58,12 @@ def test_a_session_is_a_sequence_of_its_trials(session):
 
 
 @pytest.mark.parametrize("name", ["T09", "", "S001"])
-def test_a_trial_that_there_is_not_is_refused_with_those_that_are(session, name):
+def test_an_unknown_trial_is_refused_with_the_existing_ones(session, name):
     with pytest.raises(SettingsError, match="S001/T01, S001/T02"):
         session[name]
 
 
-def test_a_terrain_that_there_is_not_is_refused_with_those_that_are(session):
+def test_an_unknown_terrain_is_refused_with_the_existing_ones(session):
     with pytest.raises(SettingsError, match="TF"):
         session.on("S0")
 
@@ -72,7 +72,7 @@ def test_a_session_is_found_by_its_folder_too(recorded):
     assert len(tr.load_session(str(recorded.folder))) == 2
 
 
-def test_a_session_that_there_is_not_is_refused():
+def test_a_missing_session_is_refused():
     with pytest.raises(SessionError, match="S009"):
         tr.load_session("S009")
 
@@ -91,7 +91,7 @@ def test_a_changed_recording_is_not_loaded(workplace, tmp_path):
     assert [trial.name for trial in left] == ["S001/T01"]
 
 
-def test_tables_are_the_trials_that_were_exported(session, tables):
+def test_tables_agree_with_the_exported_trials(session, tables):
     assert [trial.name for trial in tables] == [trial.name for trial in session]
     for ours, theirs in zip(session, tables, strict=True):
         assert (ours.kept.indices == theirs.kept.indices).all()
@@ -106,7 +106,7 @@ def test_one_table_is_a_trial_and_a_folder_is_not(workplace):
 
 
 @pytest.mark.parametrize("name", ["nothing.mcap", "nothing.csv", "nothing"])
-def test_a_file_that_is_missing_is_named(name):
+def test_a_missing_file_is_named(name):
     with pytest.raises(TractionError, match=name):
         tr.load_trial(name)
 
@@ -125,7 +125,7 @@ def test_a_frame_has_every_column_of_the_export_with_its_unit(session, workplace
     assert set(frame.attrs["meanings"]) == set(frame.columns)
 
 
-def test_a_frame_holds_what_was_recorded_unrounded(session):
+def test_a_frame_holds_the_recorded_values_unrounded(session):
     trial = session[0]
     frame = trial.to_pandas()
     assert (frame["F_n"].to_numpy() == trial.recorded.traction[:, 2]).all()
@@ -175,7 +175,7 @@ def test_a_session_is_drawn_with_a_curve_per_trial(session):
     assert axes.get_title(loc="left").startswith("TF")
 
 
-def test_a_notebook_is_given_the_picture(session):
+def test_a_plot_has_a_picture_for_notebooks(session):
     show = getattr(session.plot(), "_repr_png_")  # noqa: B009 - what notebooks call
     assert show()[:4] == b"\x89PNG"
 
@@ -183,7 +183,7 @@ def test_a_notebook_is_given_the_picture(session):
 # --- models ---------------------------------------------------------------------------
 
 
-def test_a_model_is_that_of_the_analysis(session):
+def test_a_model_agrees_with_the_analysis(session):
     model = tr.fit(session, "tustin")
     rows = TrainingSet.of([trial.kept for trial in session], 1, 0).rows
     own = fit_tustin(rows.F_n, rows.v_t, rows.F_t)
@@ -203,7 +203,7 @@ def test_a_prediction_takes_numbers_and_arrays(session):
     ("F_n", "v_t"),
     [([1, 2], [1, 2, 3]), ("much", 0.1), (float("nan"), 0.1), ([[1]], 1)],
 )
-def test_what_is_no_load_or_velocity_is_refused(session, F_n, v_t):
+def test_an_invalid_load_or_velocity_is_refused(session, F_n, v_t):
     with pytest.raises(SettingsError):
         tr.fit(session, "tustin").predict(F_n, v_t)
 
@@ -220,12 +220,12 @@ def test_a_gaussian_process_is_fitted_by_name(session):
     assert model.trials == 1
 
 
-def test_a_model_that_there_is_not_is_refused(session):
+def test_an_unknown_model_is_refused(session):
     with pytest.raises(SettingsError, match="gp_se_tustin"):
         tr.fit(session, "best")
 
 
-def test_models_are_compared_on_trials_left_out(session):
+def test_models_are_compared_on_held_out_trials(session):
     scores = tr.compare(session, ["tustin"], n_jobs=1)
     plan, _ = plan_folds(
         {"TF": [trial.kept for trial in session]}, FitOptions(models=("tustin",))
@@ -240,7 +240,7 @@ def test_models_are_compared_on_trials_left_out(session):
         scores.best("S0")
 
 
-def test_one_trial_alone_cannot_be_left_out(session):
+def test_a_comparison_with_one_trial_is_refused(session):
     with pytest.raises(SettingsError, match="TF"):
         tr.compare(session[:1], ["tustin"])
 
@@ -255,7 +255,7 @@ def test_a_model_of_several_terrains_is_refused(session, tmp_path):
         tr.fit([*session, *other], "tustin")
 
 
-def test_a_terrain_database_that_is_missing_is_named(tmp_path):
+def test_a_missing_terrain_database_is_named(tmp_path):
     with pytest.raises(SettingsError, match=r"terrains\.json"):
         tr.load_terrains(tmp_path / "terrains.json")
 
@@ -311,7 +311,7 @@ def test_the_commands_name_a_hidden_package_without_a_traceback(tmp_path):
 
 
 @pytest.mark.slow
-def test_other_folders_of_those_names_hide_nothing(tmp_path):
+def test_folders_of_those_names_elsewhere_hide_nothing(tmp_path):
     (tmp_path / "deeper" / "analysis").mkdir(parents=True)
     done = python("-c", "import traction as tr; print(tr.fit.__name__)", cwd=tmp_path)
     assert done.stdout.strip() == "fit"

@@ -1,4 +1,4 @@
-"""Simulated sessions from Python: the bytes of the command."""
+"""Sessions simulated from Python have the bytes of those of the command."""
 
 import json
 
@@ -12,19 +12,19 @@ AUTO = ("--fake", "--fast", "--operator-script", "auto")
 
 
 def files(data):
-    """Return the digest of every file but the lock, which names its process.
+    """Digest of every file but the lock, which names its process.
 
-    Of the preflight that is the checks without the free space of the disk, which others
-    use, too.
+    The preflight is represented by its checks without the free space of the disk, which
+    other programs use, too.
     """
     paths = (p for p in data.rglob("*") if p.is_file() and p.name != ".lock")
-    found = {str(path.relative_to(data)): digest(path) for path in paths}
+    digests = {str(path.relative_to(data)): digest(path) for path in paths}
     for path in data.rglob("preflight.json"):
         checks = json.loads(path.read_text())["checks"]
         assert "disk" in [check["name"] for check in checks]
-        known = [check for check in checks if check["name"] != "disk"]
-        found[str(path.relative_to(data))] = json.dumps(known)
-    return found
+        fixed = [check for check in checks if check["name"] != "disk"]
+        digests[str(path.relative_to(data))] = json.dumps(fixed)
+    return digests
 
 
 @pytest.mark.slow
@@ -40,7 +40,7 @@ def test_a_session_has_the_bytes_of_the_command(config, tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_a_further_session_is_the_one_that_is_returned(config, tmp_path):
+def test_a_second_simulation_returns_the_new_session(config, tmp_path):
     first, second = (
         tr.simulate("TF", 1, seed, tmp_path, config=config) for seed in (1, 2)
     )
@@ -51,14 +51,14 @@ def test_a_further_session_is_the_one_that_is_returned(config, tmp_path):
 @pytest.mark.parametrize(
     "arguments", [("S99",), ("--help",), ("TF", 0), ("TF", "x"), ("TF", 1, -1), ("",)]
 )
-def test_what_cannot_be_simulated_is_refused(arguments, config, tmp_path):
+def test_an_invalid_simulation_is_refused(arguments, config, tmp_path):
     with pytest.raises(SettingsError):
         tr.simulate(*arguments, data=tmp_path, config=config)
     assert not list(tmp_path.rglob("*.mcap"))
 
 
 @pytest.mark.slow
-def test_an_unfinished_session_is_not_touched(config, tmp_path):
+def test_a_simulation_next_to_an_unfinished_session_is_refused(config, tmp_path):
     options = ("--trials", 2, "--config", config, "--data", tmp_path)
     script = tmp_path / "keys"
     script.write_text("last\n")
