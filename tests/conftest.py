@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tests.experiments.program import Done
 
 DATA = Path(__file__).parent / "data"
-# A machine that stalls fails no test: how long an example takes is no claim.
+# A stalled machine must not fail a test: the time of an example is not tested.
 settings.register_profile(
     "untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
@@ -29,10 +29,10 @@ settings.load_profile("untimed")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Repeat what a stall spoils, and hear the signals that the tests send.
+    """Repeat tests after a stall, and restore the handling of signals.
 
-    A shell that starts the suite in the background, or nohup, has it ignore them, and
-    every program that a test starts would inherit that.
+    A shell that starts the suite in the background, or nohup, makes it ignore signals
+    that tests send, and every program that a test starts would inherit that.
     """
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
@@ -52,7 +52,7 @@ def pytest_collection() -> Generator[None, object, object]:
 
 @pytest.fixture(autouse=True, scope="session")
 def cache_home(tmp_path_factory):
-    """Keep what the program remembers out of the user's own folder."""
+    """Keep the program's cache out of the user's own folder."""
     with pytest.MonkeyPatch.context() as patch:
         folder = tmp_path_factory.mktemp("cache")
         patch.setenv("XDG_CACHE_HOME", str(folder))
@@ -69,7 +69,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.fixture(scope="session")
 def shared_data(request):
-    """Return the folder of the measurements that stay outside the project."""
+    """The folder of the measurements that stay outside the project."""
     folder = Path(__file__).resolve().parents[2] / "shared" / "data"
     if not folder.is_dir():
         reason = f"no measurements in {folder}"
@@ -81,13 +81,13 @@ def shared_data(request):
 
 @pytest.fixture(scope="session")
 def arm_vectors():
-    """Return kinematics and dynamics of the arm from two independent programs."""
+    """Kinematics and dynamics of the arm from two independent programs."""
     return json.loads((DATA / "wam7_vectors.json").read_text())
 
 
 @pytest.fixture(scope="session")
 def example_tool(arm_vectors):
-    """Return the sensor and the foot that the vectors were computed with."""
+    """The sensor and the foot with which the vectors were computed."""
     from wam.model.constants import Body
     from wam.model.tool import Tool
 
@@ -105,7 +105,7 @@ def example_tool(arm_vectors):
 
 @pytest.fixture(scope="session")
 def foot_model(example_tool):
-    """Return the arm with that sensor and foot on it."""
+    """The arm with that sensor and foot."""
     from wam.model.arm_model import ArmModel
     from wam.model.constants import load_constants
 
@@ -114,7 +114,7 @@ def foot_model(example_tool):
 
 @dataclass(frozen=True)
 class Recorded:
-    """One simulated session of two trials on the flat plate, for all who only look."""
+    """One simulated session of two trials on a plate, for tests that only read."""
 
     done: "Done"
     data: Path
@@ -123,7 +123,7 @@ class Recorded:
 
 @pytest.fixture(scope="session")
 def config(tmp_path_factory):
-    """Return a rig.toml with a matrix of short containers beside it."""
+    """A rig.toml with a matrix of short containers next to it."""
     from tests.experiments.program import write_config
 
     return write_config(tmp_path_factory.mktemp("config"))
@@ -131,7 +131,7 @@ def config(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def recorded(tmp_path_factory, config):
-    """Record a session; of several workers the first does, the others copy it."""
+    """A recorded session; of several workers the first records, the others copy."""
     from tests.experiments.program import Done, only_session, run_short
 
     data = tmp_path_factory.mktemp("data")
@@ -140,16 +140,16 @@ def recorded(tmp_path_factory, config):
     common = tmp_path_factory.getbasetemp().parent / "recorded"
     with common.with_suffix(".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        said = common / "said.json"
-        if said.exists():
+        result = common / "said.json"
+        if result.exists():
             shutil.copytree(common / "data", data, dirs_exist_ok=True)
-            made = json.loads(said.read_text())
+            made = json.loads(result.read_text())
             text = json.dumps(made["done"]).replace(made["data"], str(data))
             done = Done(**json.loads(text))
         else:
             done = run_short(config, data, "TF", 2)
             shutil.copytree(data, common / "data")
-            said.write_text(json.dumps({"data": str(data), "done": asdict(done)}))
+            result.write_text(json.dumps({"data": str(data), "done": asdict(done)}))
     return Recorded(done, data, only_session(data))
 
 

@@ -1,10 +1,10 @@
-"""Validates an RO-Crate with roc-validator, without network; prints what it says.
+"""Validates an RO-Crate with roc-validator, without network; prints the issues.
 
 .venv-crate/bin/python tests/crate_validation.py CRATE CONTEXT [SEVERITY]
 
 roc-validator needs an older rich than the program, so it has an environment of its
 own: `make crate-validator`. CONTEXT is the JSON-LD context of RO-Crate in the package
-rocrate (rocrate/data/ro-crate.jsonld), which stands for the one on the network.
+rocrate (rocrate/data/ro-crate.jsonld), used in place of the one on the network.
 """
 
 import json
@@ -15,7 +15,7 @@ PROFILE = "process-run-crate-0.5"
 
 
 class Answer:
-    """What a web server would answer."""
+    """Answer of a web server."""
 
     status_code = 200
     ok = True
@@ -28,11 +28,11 @@ class Answer:
         return json.loads(self.text)
 
     def raise_for_status(self) -> None:
-        """Say that all is well."""
+        """Raise nothing: every answer is a success."""
 
 
 def answer_locally(context: Path) -> None:
-    """Give the context in the place of everything on the network."""
+    """Answer every request to the network with the context."""
     from rdflib.plugins.shared.jsonld import context as jsonld
     from rocrate_validator.utils import http
 
@@ -42,7 +42,7 @@ def answer_locally(context: Path) -> None:
 
 
 def problems(crate: Path, severity: str) -> list[str]:
-    """Return every check of the profile that the crate does not pass."""
+    """Every check of the profile that the crate does not pass."""
     from rocrate_validator import services
     from rocrate_validator.models import Severity, ValidationSettings
 
@@ -60,9 +60,9 @@ def main() -> int:
     crate, context = Path(sys.argv[1]), Path(sys.argv[2])
     severity = sys.argv[3] if len(sys.argv) > 3 else "REQUIRED"
     answer_locally(context)
-    found = problems(crate, severity)
-    print(json.dumps(found, indent=1))  # noqa: T201
-    return int(bool(found))
+    issues = problems(crate, severity)
+    print(json.dumps(issues, indent=1))  # noqa: T201
+    return int(bool(issues))
 
 
 if __name__ == "__main__":

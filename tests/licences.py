@@ -22,13 +22,13 @@ each package declares of itself.
 
 
 def pins(text: str) -> dict[str, str]:
-    """Return the pinned versions by package, as constraints.txt writes them."""
-    found = (_PIN.match(line) for line in text.splitlines())
-    return {match[1]: match[2] for match in found if match}
+    """Pinned versions by package, as written in constraints.txt."""
+    matches = (_PIN.match(line) for line in text.splitlines())
+    return {match[1]: match[2] for match in matches if match}
 
 
 def licence_of(package: str) -> str:
-    """Return what a package's metadata say, or which file does."""
+    """Licence stated by a package's metadata, or the file that states it."""
     try:
         fields = metadata.metadata(package)
     except metadata.PackageNotFoundError:  # of another Python
@@ -48,7 +48,7 @@ def licence_of(package: str) -> str:
 
 
 def table(text: str) -> list[tuple[str, str, str]]:
-    """Return package, version and licence of each pin in `text`."""
+    """Package, version and licence of each pin in `text`."""
     packages = sorted(pins(text).items(), key=lambda pin: pin[0].lower())
     return [(package, version, licence_of(package)) for package, version in packages]
 

@@ -1,4 +1,4 @@
-"""The lock of what constraints.txt pins, as PEP 751 and as hashes for older pips.
+"""Locks of the pins of constraints.txt, as PEP 751 and as hashes for older pips.
 
 python -m tests.pylock
 
@@ -36,20 +36,20 @@ HEAD = """\
 
 
 def pinned(constraints: str) -> list[Requirement]:
-    """Return the pins of constraints.txt in its order."""
+    """Pins of constraints.txt, in order."""
     lines = (line.partition("#")[0].strip() for line in constraints.splitlines())
     return [Requirement(line) for line in lines if line]
 
 
 def is_wanted(pin: Requirement, python: tuple[int, int]) -> bool:
-    """Return whether a version of Python needs a pin."""
+    """Whether a version of Python needs a pin."""
     text = f"{python[0]}.{python[1]}"
     environment = {"python_version": text, "python_full_version": f"{text}.0"}
     return pin.marker is None or pin.marker.evaluate(environment)
 
 
 def fits(wheel: str, python: tuple[int, int]) -> bool:
-    """Return whether a version of Python on Linux x86-64 takes a wheel."""
+    """Whether a version of Python on Linux x86-64 takes a wheel."""
     tags = parse_wheel_filename(wheel)[3]
     major, minor = python
     if any(
@@ -67,7 +67,7 @@ def fits(wheel: str, python: tuple[int, int]) -> bool:
 def missing(
     pins: Iterable[Requirement], wheels: Sequence[str], python: tuple[int, int]
 ) -> list[str]:
-    """Return the pins that a version of Python needs and that have no wheel for it."""
+    """Pins that a version of Python needs and that have no wheel for it."""
     return [
         str(pin)
         for pin in pins
@@ -82,10 +82,10 @@ def _is_of(wheel: str, pin: Requirement) -> bool:
 
 
 def pylock(pins: Sequence[Requirement], sums: Mapping[str, str]) -> str:
-    """Return pylock.toml.
+    """Content of pylock.toml.
 
     Args:
-        pins: what is pinned, each to one version.
+        pins: requirements, each pinned to one version.
         sums: sha256 by name of the wheel.
     """
     lines = [
@@ -111,7 +111,7 @@ def pylock(pins: Sequence[Requirement], sums: Mapping[str, str]) -> str:
 
 
 def hash_lock(pins: Sequence[Requirement], sums: Mapping[str, str]) -> str:
-    """Return constraints.lock: the same for `pip install --require-hashes`."""
+    """Content of constraints.lock: the same for `pip install --require-hashes`."""
     parts: list[str] = []
     for pin in pins:
         hashes = sorted(sums[wheel] for wheel in _wheels_of(pin, sums))
@@ -126,10 +126,10 @@ def _wheels_of(pin: Requirement, sums: Mapping[str, str]) -> list[str]:
 
 
 def download(pins: Sequence[Requirement], python: tuple[int, int], to: Path) -> None:
-    """Fetch the wheels for one version of Python; what is there is not fetched again.
+    """Fetch the wheels for one version of Python that are not there yet.
 
     Raises:
-        CalledProcessError: a wheel is not to be had.
+        CalledProcessError: a wheel is not available.
     """
     wanted = to.with_suffix(".txt")
     names = (f"{p.name}{p.specifier}\n" for p in pins if is_wanted(p, python))
@@ -143,7 +143,7 @@ def download(pins: Sequence[Requirement], python: tuple[int, int], to: Path) -> 
 
 
 def main() -> int:
-    """Make both locks; return 1 if a version of Python lacks a wheel."""
+    """Make both locks; 1 if a version of Python lacks a wheel."""
     if platform.system() != "Linux":
         raise SystemExit("The lock is of Linux x86-64: make it there.")
     pins = pinned((ROOT / "constraints.txt").read_text())
@@ -160,8 +160,8 @@ def main() -> int:
     sums = {n: hashlib.sha256((folder / n).read_bytes()).hexdigest() for n in names}
     for python in PYTHONS:
         lacking = missing(pins, names, python)
-        told = "lacks " + ", ".join(lacking) if lacking else "every wheel resolves"
-        print(f"Python {python[0]}.{python[1]}: {told}")  # noqa: T201
+        verdict = "lacks " + ", ".join(lacking) if lacking else "every wheel resolves"
+        print(f"Python {python[0]}.{python[1]}: {verdict}")  # noqa: T201
     (ROOT / "pylock.toml").write_text(pylock(pins, sums))
     (ROOT / "constraints.lock").write_text(hash_lock(pins, sums))
     return 0

@@ -1,9 +1,9 @@
-"""What is installed with Traction, as a CycloneDX bill of materials in JSON.
+"""The packages installed with Traction, as a CycloneDX bill of materials in JSON.
 
 python -m tests.sbom > sbom.json
 
-Only packages that `constraints.txt` pins are in it, in the versions that are installed;
-their hashes are those of `constraints.lock`. A scanner of known vulnerabilities reads
+Only packages that `constraints.txt` pins are listed, in the installed versions; their
+hashes are those of `constraints.lock`. A scanner of known vulnerabilities reads
 such a file, e.g. `grype sbom:sbom.json`.
 """
 
@@ -23,7 +23,7 @@ _NAME = re.compile(r"^([A-Za-z0-9._-]+)==")
 
 
 def hashes(text: str) -> dict[str, list[str]]:
-    """Return the sha256 sums by package, as constraints.lock writes them."""
+    """SHA-256 sums by package, as written in constraints.lock."""
     sums: dict[str, list[str]] = {}
     name = ""
     for line in text.splitlines():
@@ -34,7 +34,7 @@ def hashes(text: str) -> dict[str, list[str]]:
 
 
 def bill(constraints: str, lock: str) -> dict[str, object]:
-    """Return the bill of what is installed of the pins in `constraints`.
+    """Bill of the installed pins of `constraints`.
 
     Args:
         constraints: text of constraints.txt.
@@ -61,7 +61,7 @@ def bill(constraints: str, lock: str) -> dict[str, object]:
 
 
 def _is_here(pin: Requirement) -> bool:
-    """Return whether this version of Python needs the pin."""
+    """Whether this version of Python needs the pin."""
     return pin.marker is None or pin.marker.evaluate()
 
 

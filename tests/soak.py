@@ -1,10 +1,10 @@
-"""Simulated hours of sessions with random faults; what has to hold is checked.
+"""Simulated hours of sessions with random faults, checked for what must hold.
 
 python -m tests.soak --hours 1 --seed 1
 
 Every session is run, and resumed until it is complete, as a person would.
-Before each trial the journal, session.json and the verified files have to agree; after
-each command the exit code and every message have to be known, the arm at rest, and
+Before each trial the journal, session.json and the verified files must agree; after
+each command the exit code and every message must be known, the arm at rest, and
 nothing left behind: descriptors, children, shared memory, memory.
 """
 
@@ -44,11 +44,11 @@ from tests.experiments.program import (
 TRIALS = 3
 CODES = {0, 3, 4, 5, 6}
 FAULT_SHARE = 0.7  # of the sessions
-MOST_RESUMES = 4
+MAX_RESUMES = 4
 GROWTH_KB = 60_000  # of a process after its first sessions
 WARM_SESSIONS = 10
 TERRAINS = ("TF", "Tf", "S0", "B10")
-# What a rehearsal can raise in a trial without ending this very process.
+# Faults that a rehearsal can raise in a trial without ending this process.
 FAULTS = (
     "reply-lost-10",
     "reply-lost-some",
@@ -82,15 +82,32 @@ FAULTS = (
 )
 
 
+def descriptors() -> int:
+    """Number of files that this process has open."""
+    return len(list(Path("/proc/self/fd").iterdir()))
+
+
+def resident_kb() -> int:
+    """Memory of this process [kB]."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * resource.getpagesize() // 1024
+
+
+def child_processes() -> frozenset[str]:
+    """Process ids of the running children of this process."""
+    task = Path(f"/proc/self/task/{os.getpid()}/children")
+    return frozenset(task.read_text().split() if task.exists() else [])
+
+
 @dataclass(slots=True)
 class Soak:
-    """What has happened so far.
+    """Progress of the sessions.
 
     Attributes:
-        folder: where the sessions are.
+        folder: folder of the sessions.
         rng: draws terrains, faults and moments.
-        built: what was built for the present session.
-        simulated_ns: how much time has passed in all simulations.
+        built: parts built for the present session.
+        simulated_ns: time that has passed in all simulations.
         counts: sessions, trials, resumes, faults by name.
         base: descriptors and memory after the first sessions.
         data: the folder of the present session.
@@ -105,10 +122,10 @@ class Soak:
     counts: Counter = field(default_factory=Counter)
     base: tuple[int, int] | None = None
     data: Path = Path()
-    children: frozenset[str] = field(default_factory=lambda: child_processes())
+    children: frozenset[str] = field(default_factory=child_processes)
 
     def check_files(self) -> None:
-        """Hold journal, session.json and verified files against each other."""
+        """Compare journal, session.json and verified files."""
         folder = only_session(self.data)
         state = replay(find_session(self.data, folder.name).events())
         kept = [f"T{number:02d}" for number in sorted(state.kept)]
@@ -120,7 +137,7 @@ class Soak:
         self.counts["checks of files"] += 1
 
     def check_command(self, done: Done) -> None:
-        """Hold exit code, messages and arm against what may be."""
+        """Check exit code, messages and arm."""
         assert done.code in CODES, done.err
         for line in done.err.splitlines():
             assert is_known(line), line
@@ -131,7 +148,7 @@ class Soak:
         assert not left, left
 
     def check_growth(self) -> None:
-        """Hold descriptors, shared memory and memory against the beginning."""
+        """Compare descriptors, shared memory and memory with the beginning."""
         gc.collect()
         left = [path.name for path in Path("/dev/shm").glob("*traction*")]
         assert left == [], left
@@ -141,23 +158,6 @@ class Soak:
         if self.base is not None:
             assert now[0] <= self.base[0] + 2, f"{now[0]} descriptors: {self.base[0]}"
             assert now[1] <= self.base[1] + GROWTH_KB, f"{now[1]} kB: {self.base[1]}"
-
-
-def descriptors() -> int:
-    """Return how many files this process has open."""
-    return len(list(Path("/proc/self/fd").iterdir()))
-
-
-def resident_kb() -> int:
-    """Return the memory of this process [kB]."""
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return pages * resource.getpagesize() // 1024
-
-
-def child_processes() -> frozenset[str]:
-    """Process ids of the running children of this process."""
-    task = Path(f"/proc/self/task/{os.getpid()}/children")
-    return frozenset(task.read_text().split() if task.exists() else [])
 
 
 def _pattern(what: str) -> str:
@@ -171,7 +171,7 @@ _KNOWN = [re.compile(_pattern(message.what)) for message in CATALOGUE.values()]
 
 
 def is_known(line: str) -> bool:
-    """Return whether a message is one of the catalogue, or a driver's with its hint."""
+    """Whether a message is one of the catalogue, or a driver's with its hint."""
     return any(known.match(line) for known in _KNOWN) and "Bug" not in line
 
 
@@ -193,7 +193,7 @@ def run_session(soak: Soak, config: Path) -> None:
     done = traction("run", terrain, *fake, *where, *options)
     soak.check_command(done)
     soak.check_files()
-    for _ in range(MOST_RESUMES):
+    for _ in range(MAX_RESUMES):
         if done.code == 0:
             break
         soak.counts["resumes"] += 1
@@ -221,7 +221,7 @@ def remove(folder: Path) -> None:
 
 
 def watch(patch: pytest.MonkeyPatch, soak: Soak) -> None:
-    """Keep hold of every simulated rig; look at the files before every trial."""
+    """Record every simulated rig; check the files before every trial."""
 
     soak.built = watch_builds(patch)
     seen: list[tuple[int, int]] = []
@@ -237,7 +237,7 @@ def watch(patch: pytest.MonkeyPatch, soak: Soak) -> None:
 
 
 def press(asked) -> str:
-    """Press the keys of short trials; keep all that are not interrupted."""
+    """Key of short trials; keeps all that are not interrupted."""
     waits = {Prompt.READY: (0.1, " "), Prompt.RECORDING: (1.0, " ")}
     wait, key = waits.get(asked.prompt, (0.05, "k"))
     if asked.prompt in {Prompt.SUPPORT, Prompt.PAUSED, Prompt.DAMPED}:
@@ -249,20 +249,22 @@ def press(asked) -> str:
     return key if asked.since > wait else ""
 
 
-def soaked(hours: float, seed: int, folder: Path, tell: Callable[[Soak], None]) -> Soak:
-    """Run sessions until so much simulated time has passed; `tell` after each."""
+def soaked(
+    hours: float, seed: int, folder: Path, report: Callable[[Soak], None]
+) -> Soak:
+    """Run sessions until `hours` of simulated time have passed; `report` after each."""
     soak = Soak(folder, np.random.default_rng(seed))
     config = write_config(folder)
     with pytest.MonkeyPatch.context() as patch:
         watch(patch, soak)
         while soak.simulated_ns < hours * 3.6e12:
             run_session(soak, config)
-            tell(soak)
+            report(soak)
     return soak
 
 
 def summary(soak: Soak) -> list[str]:
-    """Return what happened, line by line."""
+    """Summary of the sessions, line by line."""
     lines = [f"{soak.simulated_ns / 3.6e12:.3f} simulated hours"]
     lines += [f"{name}: {count}" for name, count in sorted(soak.counts.items())]
     if soak.base is not None:
@@ -271,20 +273,20 @@ def summary(soak: Soak) -> list[str]:
     return lines
 
 
-def tell(soak: Soak) -> None:
-    """Print a line now and then, for whoever waits."""
+def report(soak: Soak) -> None:
+    """Print the progress now and then."""
     if soak.counts["sessions"] % 20 == 0:
         print(" · ".join(summary(soak)[:1] + summary(soak)[-5:]))  # noqa: T201
 
 
 def main() -> None:
-    """Soak as long as the command line says."""
+    """Run sessions for the time of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--hours", type=float, default=1.0)
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="soak-") as scratch:
-        soak = soaked(given.hours, given.seed, Path(scratch), tell)
+        soak = soaked(given.hours, given.seed, Path(scratch), report)
     print("\n".join(summary(soak)))  # noqa: T201
 
 

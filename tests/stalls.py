@@ -1,4 +1,4 @@
-"""The machine that stands still: who saw it, and which tests are repeated for it."""
+"""Stalls of the machine: a witness, and the repetition of tests that met a stall."""
 
 import os
 import subprocess
@@ -12,7 +12,7 @@ import pytest
 from acquisition.clock import SystemClock
 
 CLOCK = SystemClock()
-RERUNS = 3  # of a test on the wall clock that failed beside a stall
+RERUNS = 3  # of a test on the wall clock that failed during a stall
 WITNESS = """import sys, time
 while True:
     start = time.monotonic_ns()
@@ -25,10 +25,10 @@ STALL = 6.0  # ms, of a sleep of 1 ms: three cycles
 
 
 class StallWitness:
-    """A program that only sleeps, on every core: it shows when the machine stood still.
+    """A program on every core that only sleeps, and so shows stalls of the machine.
 
-    The simulated devices share the machine with the loop. When it stalls, the guard
-    stops the arm, which is right, but not what a test looks at.
+    The simulated devices share the machine with the loop. During a stall the guard
+    stops the arm, which is right, but not what a test checks.
     """
 
     def __init__(self, folder):
@@ -48,7 +48,7 @@ class StallWitness:
         return process
 
     def stalls_since(self, t_ns):
-        """Return how often a core stood still since `t_ns` [monotonic ns]."""
+        """Number of stalls of any core since `t_ns` [monotonic ns]."""
         return sum(
             int(line) > t_ns
             for path in self._paths
@@ -64,7 +64,7 @@ class StallWitness:
 
 @contextmanager
 def stall_witness(folder):
-    """Watch for stalls of the machine; yield the witness."""
+    """A witness of stalls of the machine."""
     witness = StallWitness(folder)
     try:
         yield witness
@@ -73,10 +73,10 @@ def stall_witness(folder):
 
 
 class WallClock:
-    """Repeats a test on the wall clock that failed while the machine stood still.
+    """Repeats a test on the wall clock that failed while the machine stalled.
 
-    Any wait of such a test may end for the stall, and any promise about a time may be
-    broken by it. A test that fails without a stall, or every time, fails.
+    A stall may end any wait of such a test, and break any claim about a time. A test
+    that fails without a stall, or every time, fails.
     """
 
     def __init__(self):
@@ -85,7 +85,7 @@ class WallClock:
         self._start_ns = 0
 
     def pytest_collection_modifyitems(self, items):
-        """Have failures of the tests on the wall clock looked into."""
+        """Mark the tests on the wall clock for repetition after a stall."""
         for item in items:
             if item.get_closest_marker("wall_clock"):
                 again = pytest.mark.flaky(reruns=RERUNS, condition=self.has_stalled)
@@ -101,7 +101,7 @@ class WallClock:
             self._start_ns = CLOCK.now_ns()
 
     def has_stalled(self):
-        """Return whether the machine stood still since the attempt began."""
+        """Whether the machine stalled since the attempt began."""
         return self._witness is not None and bool(
             self._witness.stalls_since(self._start_ns)
         )

@@ -22,7 +22,7 @@ PACKAGES = (
 
 @cache
 def sources() -> dict[str, Path]:
-    """Return the file of every module; a package has the name of its folder."""
+    """File of every module; a package has the name of its folder."""
     files = {}
     for package in PACKAGES:
         for path in sorted((ROOT / package).rglob("*.py")):
@@ -47,7 +47,7 @@ def package_of(module: str) -> str:
 
 
 def imported(module: str) -> Iterator[str]:
-    """Yield the project's own modules that `module` imports."""
+    """The project's own modules that `module` imports."""
     for node in nodes_of(sources()[module]):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name in sources())
@@ -58,7 +58,7 @@ def imported(module: str) -> Iterator[str]:
 
 
 def lines_about(node: ast.ClassDef | ast.FunctionDef) -> set[str]:
-    """Return the names that begin an entry of `Attributes:` or `Args:`."""
+    """Names that begin an entry of `Attributes:` or `Args:`."""
     docstring = ast.get_docstring(node) or ""
     sections = re.findall(
         r"^(?:Attributes|Args):\n((?:    .*\n?|\n)*)", docstring, re.M
@@ -68,7 +68,7 @@ def lines_about(node: ast.ClassDef | ast.FunctionDef) -> set[str]:
 
 
 def defined_names(node: ast.ClassDef | ast.FunctionDef) -> set[str]:
-    """Return every attribute, method and parameter that `node` defines."""
+    """Every attribute, method and parameter that `node` defines."""
     inner = list(ast.walk(node))
     return {
         *(n.arg for n in inner if isinstance(n, ast.arg)),
@@ -102,7 +102,7 @@ def test_a_class_name_means_one_class():
     assert {name: w for name, w in where.items() if len(w) > 1} == {}
 
 
-def test_every_package_says_what_it_is_for():
+def test_every_package_docstring_explains_the_package():
     silent = [
         name
         for name, path in sources().items()
@@ -112,7 +112,7 @@ def test_every_package_says_what_it_is_for():
     assert silent == []
 
 
-def test_docstrings_describe_only_names_that_exist():
+def test_docstrings_describe_only_existing_names():
     stale = [
         f"{module}.{node.name}: {name}"
         for module, path in sources().items()
@@ -123,5 +123,5 @@ def test_docstrings_describe_only_names_that_exist():
     assert stale == []
 
 
-def test_packages_need_no_stubs_of_their_own():
+def test_packages_have_no_stub_files():
     assert [p for name in PACKAGES for p in (ROOT / name).rglob("*.pyi")] == []

@@ -30,12 +30,12 @@ def test_a_row_without_a_value_says_why():
 
 
 @pytest.mark.parametrize("power", [0.5, 1.0, 2.0])
-def test_growth_is_told_as_a_power(power):
+def test_growth_is_determined_as_an_exponent(power):
     points = [{"count": n, "seconds": 3.0 * n**power} for n in (10, 100, 1000)]
     assert exponent(points, "seconds") == pytest.approx(power)
 
 
-def test_folds_of_made_trials_are_planned_and_known():
+def test_folds_of_made_trials_are_planned_with_their_cost():
     cost = folds_of(16)
     assert cost["count"] == 16
     assert 0.0 < cost["megabytes"] < 10.0
@@ -48,16 +48,16 @@ def test_growth_beyond_linear_is_not_met():
             for n in (80, 800)
         ]
 
-    found = {"folds": costs(2.0), "boards": costs(0.9), "empty": 0.1}
-    verdicts = {row.what: row.verdict for row in rows_of(found)}
+    results = {"folds": costs(2.0), "boards": costs(0.9), "empty": 0.1}
+    verdicts = {row.what: row.verdict for row in rows_of(results)}
     assert verdicts["planning grows as trials to the power of"] == "not met"
     assert verdicts["`status` grows as sessions to the power of"] == "met"
 
 
-def test_a_row_stands_in_the_table_with_its_benchmark():
+def test_a_row_of_the_table_names_its_benchmark():
     text = table_of({"scale": [BenchRow("x", 1.0, "s", 2.0)]})
     assert "| x | 1 s | ≤ 2 s | met | scale |" in text
 
 
-def test_every_benchmark_is_there():
+def test_every_benchmark_exists():
     assert all(importlib.util.find_spec(f"benchmarks.{name}") for name in NAMES)

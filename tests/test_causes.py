@@ -1,7 +1,7 @@
-"""Sentences that name a cause: what establishes it, and the test that shows it.
+"""Every message that states a cause has evidence and a test that shows the cause.
 
-A refusal states what was observed, and asks about what may be behind it in its hint.
-These sentences state the cause itself. Those of imported logs are listed in
+A refusal states what was observed; its hint asks about possible causes. The messages
+listed here state the cause itself. Those of imported logs are listed in
 tests/analysis/logs/test_refusals.py, those of the guard in the fault matrix.
 """
 
@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("acquisition", "analysis", "experiments", "ft_sensor", "wam")
 GUESSES = ("probably", "perhaps", "likely", "maybe", "apparently")
 
-# (module, words of the sentence): (what establishes it, the test that shows it)
+# (module, words of the message): (evidence of the cause, the test that shows it)
 CAUSES = {
     ("wam/driver/discovery.py", "has left the bus after too many errors"): (
         "an error frame with the bus-off bit",
@@ -109,7 +109,7 @@ def functions_of(path: Path) -> set[str]:
 
 
 def sentences() -> Iterator[tuple[Path, str]]:
-    """Yield every text that an error or a message begins with."""
+    """Every text that an error or a message begins with."""
     for package in PACKAGES:
         for path in sorted((ROOT / package).rglob("*.py")):
             for node in ast.walk(ast.parse(path.read_text())):
@@ -119,7 +119,7 @@ def sentences() -> Iterator[tuple[Path, str]]:
 
 
 @pytest.mark.parametrize("row", CAUSES, ids=" ".join)
-def test_a_sentence_of_cause_is_said_and_its_test_exists(row):
+def test_a_stated_cause_is_in_the_code_and_its_test_exists(row):
     module, words = row
     _, test = CAUSES[row]
     assert words in ast.unparse(ast.parse((ROOT / module).read_text()))
@@ -127,7 +127,7 @@ def test_a_sentence_of_cause_is_said_and_its_test_exists(row):
     assert name in functions_of(ROOT / "tests" / path)
 
 
-def test_no_refusal_guesses():
+def test_no_refusal_contains_a_guess():
     guessed = [
         (path.name, text)
         for path, text in sentences()

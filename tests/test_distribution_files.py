@@ -1,4 +1,4 @@
-"""What is beside the wheel: man pages, container, workflow, and their scripts."""
+"""Files alongside the wheel: man pages, container, workflow, and their scripts."""
 
 import json
 import os
@@ -25,15 +25,15 @@ def test_every_command_has_a_page_with_all_its_options(pages):
     assert set(pages) == {"traction.1", *(f"traction-{name}.1" for name in COMMANDS)}
     for name in COMMANDS:
         text = pages[f"traction-{name}.1"].replace("\\-", "-")
-        told = traction(name, "--help").out.partition("examples:")[0]
-        options = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", told))
+        usage = traction(name, "--help").out.partition("examples:")[0]
+        options = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", usage))
         assert "--help" in options
         assert {option for option in options if option not in text} == set()
         assert text.count(".SH ") == 6
 
 
 @pytest.mark.skipif(shutil.which("groff") is None, reason="no groff")
-def test_no_page_is_taken_for_requests_of_roff(pages):
+def test_no_text_of_a_page_is_read_as_a_roff_request(pages):
     for name, text in pages.items():
         done = subprocess.run(
             ["groff", "-man", "-ww", "-Tutf8"],
@@ -45,13 +45,13 @@ def test_no_page_is_taken_for_requests_of_roff(pages):
         assert done.stderr == "", name
 
 
-def test_a_line_that_begins_like_a_request_is_none():
+def test_a_line_that_begins_like_a_request_is_escaped():
     escaped = runpy.run_path(str(ROOT / "docs" / "man_pages.py"))["escaped"]
     assert escaped(".so /etc/passwd") == "\\&.so /etc/passwd"
     assert escaped("'x\\y-z") == "\\&'x\\ey\\-z"
 
 
-def test_container_and_workflow_name_what_there_is():
+def test_container_and_workflow_name_existing_targets_and_inputs():
     makefile = (ROOT / "Makefile").read_text()
     for text in ((ROOT / "Dockerfile").read_text(),):
         for target in re.findall(r"make ([a-z]+)\b(?! &&)", text):

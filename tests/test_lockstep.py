@@ -13,15 +13,15 @@ class Device:
         return "here"
 
 
-def test_a_call_takes_its_time_from_the_part_that_it_interrupts(monkeypatch):
+def test_the_time_of_a_nested_call_counts_for_its_own_part(monkeypatch):
     calls = {"driver": ((Driver, "ask"),), "device": ((Device, "answer"),)}
     monkeypatch.setattr(lockstep, "PARTS", calls)
-    parts = lockstep.PartClock(count().__next__)  # every look takes a nanosecond
+    parts = lockstep.PartClock(count().__next__)  # every reading takes a nanosecond
     with parts.watching():
         answers = {Driver().ask(Device()) for _ in range(2)}
         Device().answer()
     Device().answer()  # not watched any more
     assert answers == {"here"}
-    # Two turns: the driver before and behind the device. The rest is the loop's.
+    # Two turns: the driver before and after the device. The rest is the loop's.
     assert parts.spent_ns == {"driver": 4, "device": 3, lockstep.LOOP: 3}
     assert parts.shares() == {"driver": 4 / 11, "device": 3 / 11, lockstep.LOOP: 4 / 11}

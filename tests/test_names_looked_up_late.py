@@ -1,7 +1,7 @@
 """Names that are looked up only when a slow test or a benchmark runs.
 
 What a test replaces in a module, what a script in a string imports, and the keywords a
-call uses: each has to exist, or a renamed thing is found out hours later.
+call uses: each must exist, or a missed rename is noticed hours later.
 """
 
 import ast
@@ -27,8 +27,8 @@ Nodes = list[ast.AST]
 
 
 @cache
-def found(path: str) -> object:
-    """Return what a dotted path names, `MISSING` for nothing."""
+def resolved(path: str) -> object:
+    """The object that a dotted path names, `MISSING` for none."""
     parts = path.split(".")
     for length in range(len(parts), 0, -1):
         try:
@@ -44,7 +44,7 @@ def found(path: str) -> object:
 
 
 def aliases(nodes: Nodes) -> dict[str, str]:
-    """Return the dotted path of every name of ours that a file imports."""
+    """Dotted path of every name of the project that a file imports."""
     paths = {}
     for node in nodes:
         if isinstance(node, ast.Import):
@@ -60,7 +60,7 @@ def calls(nodes: Nodes) -> Iterator[ast.Call]:
 
 
 def dotted(node: ast.expr) -> str:
-    """Return the name that an expression is, such as `a.b.c`; empty for no name."""
+    """Dotted name of an expression, such as `a.b.c`; empty for no name."""
     if isinstance(node, ast.Name):
         return node.id
     inner = dotted(node.value) if isinstance(node, ast.Attribute) else ""
@@ -68,20 +68,20 @@ def dotted(node: ast.expr) -> str:
 
 
 def replaced(nodes: Nodes) -> Iterator[str]:
-    """Yield the dotted path of what is replaced for a test."""
-    known = aliases(nodes)
+    """Dotted path of everything that is replaced for a test."""
+    paths = aliases(nodes)
     for call in calls(nodes):
         if not (isinstance(call.func, ast.Attribute) and call.func.attr == "setattr"):
             continue
         first, *others = call.args
         if isinstance(first, ast.Constant) and isinstance(first.value, str):
             yield first.value
-        elif others and isinstance(others[0], ast.Constant) and dotted(first) in known:
-            yield f"{known[dotted(first)]}.{others[0].value}"
+        elif others and isinstance(others[0], ast.Constant) and dotted(first) in paths:
+            yield f"{paths[dotted(first)]}.{others[0].value}"
 
 
 def imported_in_strings(nodes: Nodes) -> Iterator[str]:
-    """Yield the dotted path of what scripts in strings import."""
+    """Dotted path of everything that scripts in strings import."""
     for node in nodes:
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             for module, names in IMPORT.findall(node.value):
@@ -89,16 +89,16 @@ def imported_in_strings(nodes: Nodes) -> Iterator[str]:
 
 
 def keywords(nodes: Nodes) -> Iterator[tuple[str, str]]:
-    """Yield (dotted path, keyword) of calls of what a file imports."""
-    known = aliases(nodes)
+    """(dotted path, keyword) of calls of what a file imports."""
+    paths = aliases(nodes)
     for call in calls(nodes):
-        if (path := known.get(dotted(call.func))) is not None:
+        if (path := paths.get(dotted(call.func))) is not None:
             yield from ((path, word.arg) for word in call.keywords if word.arg)
 
 
 def takes(path: str, keyword: str) -> bool:
-    """Return whether what `path` names can be called with `keyword`."""
-    thing = found(path)
+    """Whether the object that `path` names can be called with `keyword`."""
+    thing = resolved(path)
     if not callable(thing):
         return False
     parameters = inspect.signature(thing).parameters.values()
@@ -108,10 +108,10 @@ def takes(path: str, keyword: str) -> bool:
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda f: str(f.relative_to(ROOT)))
-def test_what_a_file_looks_up_late_is_there(file):
+def test_names_that_a_file_looks_up_late_exist(file):
     nodes = list(ast.walk(ast.parse(file.read_text())))
     late = [*replaced(nodes), *imported_in_strings(nodes)]
     ours = [path for path in late if path.split(".")[0] in OURS]
-    assert [path for path in ours if found(path) is MISSING] == []
+    assert [path for path in ours if resolved(path) is MISSING] == []
     asked = set(keywords(nodes))
     assert sorted(f"{p}({k}=)" for p, k in asked if not takes(p, k)) == []

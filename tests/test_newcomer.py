@@ -1,10 +1,10 @@
-"""A newcomer types what README says, and presses what the screens ask for."""
+"""A newcomer types the commands of README, and presses the keys that are asked for."""
 
 from benchmarks.newcomer import Newcomer, commands_of, example_of
 from benchmarks.readme import README
 
 
-def test_the_commands_of_readme_are_typed_without_their_comments():
+def test_the_commands_of_readme_are_read_without_their_comments():
     commands = commands_of(README.read_text())
     assert commands[0].startswith("git clone")
     assert {"make demo", "make test"} < set(commands)
@@ -15,7 +15,7 @@ def test_the_example_of_readme_is_python():
     assert "tr.load_session" in example_of(README.read_text())
 
 
-def test_a_key_is_pressed_that_is_asked_for_and_a_folder_stays(tmp_path):
+def test_requested_keys_are_pressed_and_the_folder_persists(tmp_path):
     somebody = Newcomer(tmp_path)
     assert somebody.type("mkdir there && cd there").code == 0
     asking = "IFS= read -rsn1 -p 'begin [space]' key; test \"$key\" = ' '"
@@ -27,17 +27,17 @@ def test_a_key_is_pressed_that_is_asked_for_and_a_folder_stays(tmp_path):
     assert kept.words.split()[-4:] == ["k", str(tmp_path / "there"), "24", "80"]
 
 
-def test_a_key_that_was_forgotten_is_pressed_again(tmp_path):
+def test_a_lost_key_is_pressed_again(tmp_path):
     asked = "printf 'begin [space]'; sleep 0.5; read -rst 0.1 -N 99; printf '\\rwait'"
     step = Newcomer(tmp_path).type(f'{asked}; IFS= read -rsn1 key; echo "<$key>"')
     assert step.words.endswith("< >\r\n")
 
 
-def test_a_failure_shows_its_last_words(tmp_path):
+def test_a_failure_shows_its_last_output(tmp_path):
     step = Newcomer(tmp_path).type("echo no such stone >&2; exit 4")
     assert (step.code, step.words.strip()) == (4, "no such stone")
 
 
-def test_the_home_is_empty(tmp_path):
+def test_the_home_folder_is_empty(tmp_path):
     step = Newcomer(tmp_path).type("ls -A ~; echo $HOME; echo ${VIRTUAL_ENV:-none}")
     assert step.words.split() == [str(tmp_path), "none"]

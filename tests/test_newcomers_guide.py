@@ -20,7 +20,7 @@ PACKAGES = (
     "traction",
     "wam",
 )
-TRIED_BY = {  # what is printed when a recipe works
+TRIED_BY = {  # output of a recipe that works
     "A terrain": r"M5 +simulated +1/1",
     "A sensor": r"Complete\.",
     "A kernel or model": r"index\.html",
@@ -37,7 +37,7 @@ TRIED = re.compile(r"^Try it:" + BLOCK, re.MULTILINE | re.DOTALL)
 
 
 def recipe(title):
-    """Return the part of the guide under a heading."""
+    """Part of the guide under a heading."""
     return re.split(r"^## ", GUIDE.partition(f"## {title}\n")[2], flags=re.M)[0]
 
 
@@ -53,7 +53,7 @@ def tree(tmp_path):
 
 
 def make(tree, title):
-    """Make every change of a recipe; return the files that it touches."""
+    """Make every change of a recipe; the files changed."""
     files = []
     for change in CHANGE.finditer(recipe(title)):
         path, text = tree / change["file"], change["text"]
@@ -71,8 +71,8 @@ def make(tree, title):
 
 
 def tried(tree, title):
-    """Run what a recipe tries and return what was printed."""
-    said = []
+    """Run the commands of a recipe; their output."""
+    outputs = []
     scripts = tree / "bin"
     scripts.mkdir()
     (scripts / "traction").write_text(
@@ -93,12 +93,12 @@ def tried(tree, title):
             check=False,
         )
         assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
-        said.append(done.stdout + done.stderr)
-    return "\n".join(said)
+        outputs.append(done.stdout + done.stderr)
+    return "\n".join(outputs)
 
 
 def counted(title):
-    """Return how many files the guide's table promises for a recipe."""
+    """Number of files that the guide's table states for a recipe."""
     row = re.search(rf"^\| {title.lower()} \| (.*) \|$", GUIDE, re.MULTILINE)
     return sum(map(int, re.findall(r"\d+", row[1])))
 
@@ -106,7 +106,7 @@ def counted(title):
 @pytest.mark.slow
 @pytest.mark.timeout(300)  # each copies the program and runs it
 @pytest.mark.parametrize(("title", "word"), TRIED_BY.items())
-def test_a_recipe_of_the_guide_works_with_the_files_that_it_names(tree, title, word):
+def test_a_recipe_of_the_guide_works_with_the_stated_number_of_files(tree, title, word):
     files = make(tree, title)
     assert len(set(files)) == counted(title)
     assert re.search(word, tried(tree, title))
@@ -117,6 +117,6 @@ def test_a_recipe_of_the_guide_works_with_the_files_that_it_names(tree, title, w
         assert '"rig.ft_sensor.kind": "acme"' in record.read_text()
 
 
-def test_every_recipe_of_the_guide_is_followed():
+def test_every_recipe_of_the_guide_is_tested():
     titles = re.findall(r"^## (.*)$", GUIDE, re.MULTILINE)
     assert [*TRIED_BY, "Before it is done"] == titles

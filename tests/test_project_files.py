@@ -1,4 +1,4 @@
-"""Files of the project that other programs read say the same as the project."""
+"""Files of the project that other programs read agree with the project."""
 
 import re
 import subprocess
@@ -19,7 +19,7 @@ def parsed(name):
     return yaml.safe_load((ROOT / name).read_text())
 
 
-def test_a_citation_names_the_version_that_is_released():
+def test_the_citation_names_version_and_licence_of_the_project():
     citation = parsed("CITATION.cff")
     assert citation["version"] == PROJECT["version"]
     assert citation["license"] == PROJECT["license"]
@@ -39,13 +39,13 @@ def test_commits_are_checked_by_the_ruff_of_the_project():
     }
 
 
-def test_a_problem_is_reported_with_the_page_of_the_rig():
+def test_a_problem_report_asks_for_the_page_of_the_preflight():
     fields = parsed(".github/ISSUE_TEMPLATE/problem.yml")["body"]
     labels = [field["attributes"]["label"] for field in fields]
     assert "Output of `traction check --json`" in labels
 
 
-def test_commands_and_pages_named_for_programs_are_there():
+def test_commands_and_pages_named_in_agents_md_exist():
     text = (ROOT / "AGENTS.md").read_text()
     names = re.findall(r"\]\(([^)]+)\)", text)
     assert names
@@ -60,10 +60,10 @@ def test_commands_and_pages_named_for_programs_are_there():
     assert moving < set(COMMANDS)
 
 
-def test_no_file_holds_two_versions_of_a_line():
+def test_no_file_has_conflict_markers():
     marks = r"^(<<<<<<< |>>>>>>> )"
     words = ["git", "grep", "-nIE", marks]
-    found = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
-    if found.returncode == FATAL:
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+    if done.returncode == FATAL:
         pytest.skip("no checkout of git")
-    assert found.stdout == ""
+    assert done.stdout == ""

@@ -28,7 +28,7 @@ SUMS = {
 }
 
 
-def test_the_locks_are_those_of_the_constraints():
+def test_the_locks_agree_with_the_constraints():
     assert (ROOT / "pylock.toml").read_text() == pylock(PINS, SUMS)
     assert (ROOT / "constraints.lock").read_text() == hash_lock(PINS, SUMS)
     assert {p.name for p in PINS} == set(pins((ROOT / "constraints.txt").read_text()))
@@ -40,7 +40,7 @@ def test_both_locks_have_the_same_checksums():
 
 
 @pytest.mark.parametrize("python", PYTHONS)
-def test_every_pin_has_a_wheel_for_every_python_that_is_declared(python):
+def test_every_pin_has_a_wheel_for_every_declared_python(python):
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     name = f"Programming Language :: Python :: {python[0]}.{python[1]}"
     assert name in project["classifiers"]
@@ -67,7 +67,7 @@ def test_a_pin_without_a_wheel_is_missing():
         ("a-1-cp313-cp313-win_amd64.whl", (3, 13), False),
     ],
 )
-def test_wheels_are_taken_by_their_tags(wheel, python, expected):
+def test_wheels_are_selected_by_their_tags(wheel, python, expected):
     assert fits(wheel, python) is expected
 
 

@@ -19,9 +19,9 @@ def results(mae):
 
 
 @pytest.mark.parametrize(("mae", "same"), [(0.40, True), (0.41, True), (0.45, False)])
-def test_a_figure_may_drift_by_five_percent(mae, same):
-    told, seen = demo_rows(results(0.40))[0], demo_rows(results(mae))[0]
-    assert is_same(seen, told) is same
+def test_a_figure_may_drift_by_a_small_share_only(mae, same):
+    stated, seen = demo_rows(results(0.40))[0], demo_rows(results(mae))[0]
+    assert is_same(seen, stated) is same
 
 
 def test_another_sentence_is_another_row():

@@ -19,7 +19,7 @@ def test_every_pin_of_the_lock_has_a_checksum():
     assert [name for name in pins(CONSTRAINTS) if not hashes(LOCK).get(name)] == []
 
 
-def test_the_bill_names_every_pinned_package_as_it_is_installed():
+def test_the_bill_names_every_pinned_package_in_its_installed_version():
     made = bill(CONSTRAINTS, LOCK)
     assert made["bomFormat"] == "CycloneDX"
     versions = {part["name"]: part["version"] for part in made["components"]}

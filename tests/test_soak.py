@@ -9,9 +9,9 @@ MINUTE = 1 / 60  # h, simulated
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 
 
-def test_a_simulated_minute_with_faults_keeps_every_promise(tmp_path):
+def test_a_simulated_minute_with_faults_passes_every_check(tmp_path):
     seen = []
-    soak = soaked(MINUTE, seed=1, folder=tmp_path, tell=seen.append)
+    soak = soaked(MINUTE, seed=1, folder=tmp_path, report=seen.append)
     assert soak.simulated_ns >= MINUTE * 3.6e12
     assert soak.counts["sessions"] == len(seen) >= 2
     assert soak.counts["checks of files"] > soak.counts["trials"]

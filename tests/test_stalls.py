@@ -1,4 +1,4 @@
-"""Which failures a machine that stands still excuses."""
+"""Only failures of wall-clock tests during a stall are repeated."""
 
 import pytest
 
@@ -19,40 +19,40 @@ def test_on_stepped_time():
 """
 
 
-class Told(WallClock):
-    """As it is, but for a machine of which is said whether it stood still."""
+class StatedStall(WallClock):
+    """WallClock with a stated answer: stalled or not."""
 
-    def __init__(self, *, stood_still):
+    def __init__(self, *, stalled):
         super().__init__()
-        self._stood_still = stood_still
+        self._stalled = stalled
 
     def has_stalled(self):
-        return self._stood_still
+        return self._stalled
 
 
 @pytest.fixture
 def outcome(pytester):
-    def run(*, passes=1, stepped=True, stood_still=False):
+    def run(*, passes=1, stepped=True, stalled=False):
         pytester.makeini("[pytest]\nmarkers = wall_clock: waits\n")
         pytester.makepyfile(TEST.format(passes=passes, stepped=stepped))
-        ran = pytester.inline_run(plugins=[Told(stood_still=stood_still)])
+        ran = pytester.inline_run(plugins=[StatedStall(stalled=stalled)])
         ends = [r.outcome for r in ran.getreports() if getattr(r, "when", "") == "call"]
         return [ends.count(outcome) for outcome in ("passed", "rerun", "failed")]
 
     return run
 
 
-def test_a_failure_beside_a_stall_is_repeated(outcome):
-    assert outcome(passes=RERUNS + 1, stood_still=True) == [2, RERUNS, 0]
+def test_a_failure_during_a_stall_is_repeated(outcome):
+    assert outcome(passes=RERUNS + 1, stalled=True) == [2, RERUNS, 0]
 
 
-def test_a_failure_without_a_stall_is_one(outcome):
+def test_a_failure_without_a_stall_is_not_repeated(outcome):
     assert outcome(passes=2) == [1, 0, 1]
 
 
-def test_what_fails_every_time_fails(outcome):
-    assert outcome(passes=RERUNS + 2, stood_still=True) == [1, RERUNS, 1]
+def test_a_test_that_fails_every_time_fails(outcome):
+    assert outcome(passes=RERUNS + 2, stalled=True) == [1, RERUNS, 1]
 
 
-def test_what_needs_no_clock_is_not_repeated(outcome):
-    assert outcome(stepped=False, stood_still=True) == [1, 0, 1]
+def test_a_failure_on_stepped_time_is_not_repeated(outcome):
+    assert outcome(stepped=False, stalled=True) == [1, 0, 1]

@@ -1,4 +1,4 @@
-"""Analysis, package and simulation where there is no Linux; what needs it says so."""
+"""Analysis, package and simulation run without Linux; processes are refused."""
 
 import json
 import subprocess
@@ -20,7 +20,7 @@ print(model)
 
 
 def elsewhere(*arguments, code=0):
-    """Return what the program prints on such a system."""
+    """Output of the program on such a system."""
     words = [sys.executable, "-m", "tests.without_linux", *map(str, arguments)]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == code, (done.stdout, done.stderr)
@@ -47,11 +47,11 @@ def test_tables_are_fitted_and_reported(tmp_path):
 
 
 @pytest.mark.slow
-def test_an_arm_is_refused_with_its_cause(tmp_path):
+def test_processes_are_refused_with_the_cause(tmp_path):
     asked = ("run", "S0", "--fake", "--processes", "--trials", 1, "--data", tmp_path)
-    told = elsewhere(*asked, "--operator-script", "auto", code=3)
-    assert "need Linux" in told
-    assert "Simulations run here with --fake" in told
+    output = elsewhere(*asked, "--operator-script", "auto", code=3)
+    assert "need Linux" in output
+    assert "Simulations run here with --fake" in output
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Every judge of a commissioning is tripped by a wrong rig, every rig by a judge."""
+"""Every step of a commissioning finds a wrong rig, and every wrong rig is found."""
 
 import pytest
 
@@ -28,30 +28,30 @@ OF_RECORDINGS = {
         "balance",
     ),
 }
-# Only in the check of every day.
+# Only in the daily check.
 OF_THE_DAY = {"changed", "exchange", "zero", "hang_force", "hang_way", "drift"}
 ROWS = [(name, finding) for name, row in FOUND.items() for finding in row]
 
 
-def test_every_rig_of_the_catalogue_is_found_and_no_other():
+def test_every_rig_of_the_catalogue_has_a_finding():
     assert set(FOUND) == set(catalogue())
     assert all(finding.by for _, finding in ROWS)
 
 
-def test_every_judge_is_tripped_by_a_rig():
+def test_every_step_finds_a_wrong_rig():
     assert {finding.step for _, finding in ROWS} == set(STEPS)
     judged = {finding.step for _, finding in ROWS if finding.by != (REFUSED,)}
     assert judged == set(STEPS)
 
 
-def test_every_quantity_is_tripped_by_a_rig_or_judged_elsewhere():
+def test_every_quantity_finds_a_wrong_rig_or_is_tested_elsewhere():
     tripped = {key for _, finding in ROWS for key in finding.by} - {REFUSED, WARNED}
     assert tripped <= set(LIMITS)
     others = [OF_THE_WORK, OF_RECORDINGS, OF_THE_DAY]
-    assert all(not tripped & each for each in others)
+    assert all(not tripped & group for group in others)
     assert set().union(tripped, *others) == set(LIMITS)
 
 
 @pytest.mark.parametrize("row", parameters(rig_attacks()))
-def test_a_wrong_rig_is_found_as_the_table_says(row, tmp_path):
+def test_a_wrong_rig_is_found_as_listed_in_the_table(row, tmp_path):
     row.check(tmp_path)

@@ -1,4 +1,4 @@
-"""The program as on a system that lacks what only Linux, or no Windows, has.
+"""The program as on a system without the functions that Windows lacks.
 
 python -m tests.without_linux ARGUMENTS OF TRACTION ...
 """
@@ -19,7 +19,7 @@ ABSENT = (
 
 
 def remove() -> None:
-    """Take away what is absent elsewhere, before the program is imported."""
+    """Remove the functions that are absent elsewhere; call before any import."""
     importlib.import_module("serial")  # which has a port of its own for each system
     for name in ABSENT:
         if hasattr(os, name):

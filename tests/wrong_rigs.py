@@ -1,10 +1,10 @@
 """Which step of `traction commission` finds which wrong rig, by which quantity.
 
 `FOUND` is the table. Each rig of the catalogue is commissioned by the scripted operator
-in stepped time, in a folder of its own, beside a container of full length, from a step
-that needs nothing of what came before. What it did before it was found is read from the
+in stepped time, in its own folder, with a container of full length, from a step that
+needs nothing of the steps before. The motion before the finding is read from the
 recordings of C8 to C11: energy of the arm, speed and travel of the sole, by the
-positions as believed.
+positions as reported.
 """
 
 import re
@@ -33,13 +33,13 @@ from tests.experiments.program import traction, write_config
 from wam.model.arm_model import ArmModel
 from wam.model.constants import load_constants
 
-# Nothing may go further before it is found: the guard's own bound in a proof, the way
-# of a lift, and a slow hand.
-MOST_ENERGY, MOST_TRAVEL, MOST_SPEED = 0.070, 0.025, 0.2  # J, m, m/s
+# Bounds of the motion before a finding: the guard's own bound in a powered test, the
+# travel of a lift, and a slow hand.
+MAX_ENERGY, MAX_TRAVEL, MAX_SPEED = 0.070, 0.025, 0.2  # J, m, m/s
 SEED, FRICTION = 1, 0.7
 _SOUND_SEEDS, _SHARES = range(1, 41), (0.4, 0.7, 1.0)
 _SPEED_OVER = 10  # cycles, over which a speed is taken
-_TRAVEL = 0.45  # m, of a container whose corners can be told apart
+_TRAVEL = 0.45  # m, of a container whose corners can be distinguished
 REFUSED, WARNED = "no judgement", "a note"
 _QUICK = {StepId.CONFIGURATION, StepId.LISTEN, StepId.IDENTITY}
 
@@ -49,9 +49,9 @@ class Finding:
     """A step that finds a wrong rig.
 
     Attributes:
-        step: it finds it.
+        step: step that finds the rig.
         by: quantities of `judging.LIMITS` that are beyond their limits then; REFUSED =
-            the step ends without a judgement; WARNED = it passes with a note.
+            the step ends without a judgement; WARNED = the step passes with a note.
         first: step to begin with; "" = the same.
     """
 
@@ -128,12 +128,12 @@ class Ending:
     """How the commissioning of one rig ended.
 
     Attributes:
-        step: that found it; "" = none.
-        by: as of `Finding`, in the order in which they are judged, each once.
-        cause: in words.
-        energy: largest of the arm before that [J].
-        travel: of the sole before that [m].
-        speed: largest of the sole before that [m/s].
+        step: step that keys the rig; "" = none.
+        by: as in `Finding`, in the order of judgement, each once.
+        cause: cause in words.
+        energy: largest energy of the arm before the finding [J].
+        travel: largest travel of the sole before the finding [m].
+        speed: largest speed of the sole before the finding [m/s].
     """
 
     step: str
@@ -145,15 +145,15 @@ class Ending:
 
     @property
     def is_gentle(self) -> bool:
-        """Whether the arm went no further before it was found than it may."""
+        """Whether the motion before the finding stayed within its bounds."""
         return (
-            self.energy <= MOST_ENERGY
-            and self.travel <= MOST_TRAVEL
-            and self.speed <= MOST_SPEED
+            self.energy <= MAX_ENERGY
+            and self.travel <= MAX_TRAVEL
+            and self.speed <= MAX_SPEED
         )
 
     def is_as(self, finding: Finding) -> bool:
-        """Return whether it is what the table says, in whatever order."""
+        """Whether the ending agrees with the table, in any order."""
         return self.step == finding.step and set(self.by) == set(finding.by)
 
 
@@ -165,12 +165,12 @@ def commissioned(
     first: str = "",
     last: str = "",
 ) -> Ending:
-    """Commission a simulated rig; return which step found what.
+    """Commission a simulated rig; how the commissioning ended.
 
     Args:
-        name: of the catalogue; "" = a sound rig.
-        seed: of the sound rig that it departs from.
-        friction: share of another arm's.
+        name: name in the catalogue; "" = a sound rig.
+        seed: seed of the sound rig from which the rig deviates.
+        friction: share of the identified friction of another arm.
         first: step to begin with; "" = C0.
         last: step to end with; "" = the last.
     """
@@ -182,18 +182,18 @@ def commissioned(
 
 
 def found_by(name: str, finding: Finding) -> Ending:
-    """Return how the commissioning ends that has to find a rig so."""
+    """Ending of the commissioning that must find a rig by `finding`."""
     first = finding.first or finding.step
     return commissioned(name, first=first, last=finding.step)
 
 
 def rig_attacks() -> list[Attack]:
-    """Return every finding; those before the loop runs are quick."""
+    """Every finding; those before the loop runs are quick."""
     return [_attack(name, finding) for name, row in FOUND.items() for finding in row]
 
 
 def sound_attacks() -> list[Attack]:
-    """Return sound arms of different zeros, stops, sensors and friction."""
+    """Sound arms of different zeros, stops, sensors and friction."""
     return [_sound(seed, _SHARES[seed % len(_SHARES)]) for seed in _SOUND_SEEDS]
 
 
@@ -221,7 +221,7 @@ def _attack(name: str, finding: Finding) -> Attack:
     return Attack(
         name,
         finding.step,
-        f"found by {', '.join(finding.by)}, at most {1e3 * MOST_TRAVEL:.0f} mm further",
+        f"found by {', '.join(finding.by)}, at most {1e3 * MAX_TRAVEL:.0f} mm further",
         check,
         RunBy.CI if finding.step in _QUICK else RunBy.NIGHTLY,
         seconds=1200,
@@ -244,9 +244,9 @@ def _commission(
 
 
 def _is_of_other_pucks(name: str) -> bool:
-    """Return whether only the record of a former day can tell what is wrong."""
-    said = wrong_rig(name).departure.properties if name else ()
-    return any(what == "SN" for _, what, _ in said)
+    """Whether only the record of an earlier day reveals what is wrong."""
+    properties = wrong_rig(name).departure.properties if name else ()
+    return any(what == "SN" for _, what, _ in properties)
 
 
 def _ending(
@@ -268,15 +268,15 @@ def _ending(
 
 
 def _beyond(done: StepRecord) -> tuple[str, ...]:
-    """Return the quantities that were beyond their limits, each once."""
-    names = [each.name for each in done.quantities if not each.is_within]
+    """Quantities that were beyond their limits, each once."""
+    names = [quantity.name for quantity in done.quantities if not quantity.is_within]
     return tuple(dict.fromkeys(_key_of(name) for name in names))
 
 
 def _key_of(name: str) -> str:
-    """Return the name in `LIMITS` of a quantity as it stands in a record."""
-    found = [key for key, pattern in _NAMES.items() if pattern.fullmatch(name)]
-    return max(found, key=lambda key: len(LIMITS[key].name))
+    """Name in `LIMITS` of a quantity named in a record."""
+    keys = [key for key, pattern in _NAMES.items() if pattern.fullmatch(name)]
+    return max(keys, key=lambda key: len(LIMITS[key].name))
 
 
 _NAMES = {
@@ -286,7 +286,7 @@ _NAMES = {
 
 
 def _note(folder: Path, steps: Sequence[StepRecord]) -> tuple[str, str]:
-    """Return the first step that warned of something, and of what; "" = none."""
+    """First step that gave a warning, and the warning; "" = none."""
     for done in steps:
         if notes := STEPS[done.step].judge(read_raw(folder, done.raw[0])).notes:
             return done.step, "; ".join(notes)
@@ -303,7 +303,7 @@ _ACTIVE = (
 
 
 def _moved(recordings: Sequence[Values]) -> tuple[float, float, float]:
-    """Return largest energy [J], travel [m] and speed [m/s] of the sole."""
+    """Largest energy [J] of the arm, travel [m] and speed [m/s] of the sole."""
     constants = load_constants()
     model = ArmModel(constants, build_tool(load_settings(None).rig, "tread"))
     energy = travel = speed = 0.0
