@@ -176,7 +176,7 @@ def rows() -> list[BenchRow]:
     with threadpool_limits(1):
         by_name = {str(part["part"]): part for part in (p.measured() for p in parts(3))}
         peers = [
-            beside(what, goal, maker)
+            peer_row(what, goal, maker)
             for what, goal, maker in (
                 ("the same against GPy", 10, peer_gpy.fitter),
                 ("the same against tinygp, compiled before", 8, peer_tinygp.fitter),
@@ -196,7 +196,7 @@ def rows() -> list[BenchRow]:
     ]
 
 
-def beside(what: str, goal: float, maker: Fitter) -> BenchRow:
+def peer_row(what: str, goal: float, maker: Fitter) -> BenchRow:
     """Return the speed-up of our SE fit over a peer's, the likelihood gap as its note.
 
     Args:

@@ -7,7 +7,7 @@ _DRIVER, _DRIVER_TESTS = "wam/driver", "tests/wam/driver"
 _RUN, _RUN_TESTS = "experiments/run", "tests/experiments/run"
 _POSES = (
     "tests/wam/calibration/test_gravity_poses.py",
-    "tests/experiments/run/test_surroundings.py",
+    "tests/experiments/run/test_free_space_of_rig.py",
     "tests/experiments/calibration/test_pose_file.py",
 )
 _SALVAGED = (
@@ -19,7 +19,7 @@ _SALVAGED = (
 )
 _PUBLISHED = (
     "tests/experiments/export/test_checksums.py",
-    "tests/experiments/export/test_witnesses.py",
+    "tests/experiments/export/test_publication_check.py",
 )
 
 TESTS = {
@@ -137,7 +137,7 @@ TESTS = {
         "tests/experiments/session/test_witnesses.py",
     ),
     "experiments/export/checksums.py": _PUBLISHED,
-    "experiments/export/witnesses.py": _PUBLISHED,
+    "experiments/export/publication_check.py": _PUBLISHED,
     "experiments/session/crash_recovery.py": (
         "tests/experiments/session/test_crash_recovery.py",
     ),
@@ -444,9 +444,9 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): _AT_REST,
     (
         "wam/calibration/poses.py",
-        "reachable = [q for q in drawn[heights > space.floor] if all((space.holds("
+        "reachable = [q for q in drawn[heights > space.floor] if all((space.is_free("
         "q + side) for side in sides))] -> "
-        "reachable = [q for q in drawn[heights > space.floor] if all((space.holds("
+        "reachable = [q for q in drawn[heights > space.floor] if all((space.is_free("
         "q - side) for side in sides))]",
     ): "the sides are the same on both sides",
     (
@@ -530,9 +530,9 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): "up carries the same information as down",
     (
         "wam/calibration/poses.py",
-        "reachable = [q for q in drawn[heights > space.floor] if all((space.holds("
+        "reachable = [q for q in drawn[heights > space.floor] if all((space.is_free("
         "q + side) for side in sides))] -> "
-        "reachable = [q for q in drawn[heights >= space.floor] if all((space.holds("
+        "reachable = [q for q in drawn[heights >= space.floor] if all((space.is_free("
         "q + side) for side in sides))]",
     ): _AT_REST,
     (

@@ -20,14 +20,14 @@ from analysis.gp.climb import climb
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.noise import ConstantNoise
 from analysis.gp.proposals import bounds
-from analysis.gp.search import Posterior, likeliest
+from analysis.gp.search import Posterior, maximise_posterior
 from analysis.gp.trial_noise import TrialNoise, TrialRows
 from analysis.study.crossval import FoldTask, choose_rows
 from analysis.study.models import TUSTIN
 from analysis.study.tasks import run_tasks
 from benchmarks.fit import SLICE, many_starts
 from benchmarks.peer_sklearn import KERNELS
-from benchmarks.study_race import FITS, folds_of, given
+from benchmarks.study_race import FITS, fold_rows, folds_of
 
 _STARTS = 20
 _MISSED = 0.05  # nat
@@ -36,7 +36,7 @@ _LEVEL = " + level"
 
 
 @dataclass(frozen=True)
-class RawRecord:
+class FitRecord:
     """Optimum of one fit, compared with the best of twenty starts.
 
     Attributes:
@@ -58,14 +58,14 @@ class RawRecord:
     seconds: float
 
 
-def examine(task: FoldTask) -> list[RawRecord]:
+def examine(task: FoldTask) -> list[FitRecord]:
     """Fit the models of one fold and return their optima."""
     chosen = choose_rows(task)
-    rows = given(task)
+    rows = fold_rows(task)
     sse, best = rows.curve.sse, many_starts(task.training)
     fold = f"{task.terrain} fold {task.fold + 1}"
     is_missed = sse > (1.0 + _SQUARES) * best
-    records = [RawRecord(fold, TUSTIN, -sse, -min(sse, best), is_missed, 0, 0.0)]
+    records = [FitRecord(fold, TUSTIN, -sse, -min(sse, best), is_missed, 0, 0.0)]
     training = TrainingSet(task.training, task.lengths, chosen)
     trial, order = training.trial_of()[chosen], np.argsort(chosen)
     trials = TrialRows(trial[order])
@@ -75,18 +75,18 @@ def examine(task: FoldTask) -> list[RawRecord]:
         level = Likelihood(kernel, TrialNoise(), rows.X[order], r[order], trials)
         for title, likelihood in ((name, alone), (name + _LEVEL, level)):
             before = time.process_time()
-            ours = likeliest(likelihood)
+            ours = maximise_posterior(likelihood)
             cpu_s = time.process_time() - before
-            best = max(ours.lml, twenty(likelihood, task.fold))
+            best = max(ours.lml, best_of_twenty(likelihood, task.fold))
             count = sum(start.evaluations for start in ours.starts)
             is_missed = ours.lml < best - _MISSED
             records.append(
-                RawRecord(fold, title, ours.lml, best, is_missed, count, cpu_s)
+                FitRecord(fold, title, ours.lml, best, is_missed, count, cpu_s)
             )
     return records
 
 
-def twenty(likelihood: Likelihood, seed: int) -> float:
+def best_of_twenty(likelihood: Likelihood, seed: int) -> float:
     """Return the largest log likelihood reached from twenty starts."""
     kernel, noise, sd = likelihood.kernel, likelihood.noise, float(likelihood.r.std())
     box = np.vstack([bounds(kernel, sd, np.ones(2)), noise.bounds(sd)])
@@ -102,7 +102,7 @@ def twenty(likelihood: Likelihood, seed: int) -> float:
     return max(climb(posterior, start, box).value for start in starts)
 
 
-def summary(records: Sequence[RawRecord]) -> list[str]:
+def summary(records: Sequence[FitRecord]) -> list[str]:
     """Return the printed lines: one per model, and one per fit that missed."""
     lines = []
     for name in dict.fromkeys(record.model for record in records):

@@ -88,7 +88,7 @@ def theirs(part: str, start: np.ndarray, sd: float) -> Kernel:
 def three_starts(part: str, X: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, ...]:
     """Return three initial thetas: the start of our search, then its design points."""
     kernel, noise = KERNELS[part], ConstantNoise()
-    starts = posterior_search(kernel, noise, X, y).began
+    starts = posterior_search(kernel, noise, X, y).start_points
     sd = float(y.std())
     design = [
         np.concatenate([point, noise.start(sd)])

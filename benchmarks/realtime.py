@@ -23,7 +23,7 @@ import numpy as np
 
 from acquisition.control_loop.realtime import choose_cores
 from acquisition.sample import Record
-from benchmarks.realtime_table import RawRecord, Times, Window, table
+from benchmarks.realtime_table import RealtimeRecord, Times, Window, table
 from experiments.preflight.loop_benchmark import run_bench
 from experiments.preflight.preflight import start_devices
 from experiments.rig.processes import MultiProcessBackend
@@ -67,12 +67,12 @@ def settings_with_bus_sensor() -> Settings:
     return dataclasses.replace(settings, rig=rig)
 
 
-def alternate(windows: int, seconds: float, core: int, program: Path) -> RawRecord:
+def alternate(windows: int, seconds: float, core: int, program: Path) -> RealtimeRecord:
     """Run the loop and the C programs in turn on `core`, `windows` times.
 
     Each window has its own rig, since the C program is a second bus master.
     """
-    settings, record = settings_with_bus_sensor(), RawRecord()
+    settings, record = settings_with_bus_sensor(), RealtimeRecord()
     for _ in range(windows):
         rig = build_rig(
             settings, settings.matrix.terrains[0], FakeOptions("processes", seed=1)
@@ -84,7 +84,7 @@ def alternate(windows: int, seconds: float, core: int, program: Path) -> RawReco
 
 
 def measure(
-    rig: Rig, record: RawRecord, seconds: float, core: int, program: Path
+    rig: Rig, record: RealtimeRecord, seconds: float, core: int, program: Path
 ) -> None:
     """Run the loop of `rig` and then the C programs; add the results to `record`."""
     backend = rig.backend

@@ -56,7 +56,7 @@ def explained(moments: Times, stalls: Times) -> NDArray[np.bool_]:
 
 
 @dataclasses.dataclass(slots=True)
-class RawRecord:
+class RealtimeRecord:
     """Measurements of all windows: loop reports, loop cycles, both C programs."""
 
     reports: list[BenchReport] = dataclasses.field(default_factory=list)
@@ -78,7 +78,7 @@ def use_of(report: BenchReport, process: str) -> ProcessUse:
     return next(use for use in report.processes if use.name == process)
 
 
-def table(record: RawRecord, stalls: Times) -> list[Row]:
+def table(record: RealtimeRecord, stalls: Times) -> list[Row]:
     """Return all rows; `stalls`: end and length of each stall [ns], shape (n, 2)."""
     return [
         *cycle_rows(record, stalls),
@@ -94,7 +94,7 @@ def quantiles(times: Times) -> str:
     return " / ".join(f"{value / 1000:.0f}" for value in values) + " us"
 
 
-def cycle_rows(record: RawRecord, stalls: Times) -> list[Row]:
+def cycle_rows(record: RealtimeRecord, stalls: Times) -> list[Row]:
     """Return the rows on the timing within a cycle."""
     cycles = record.cycles()
     whole = (cycles[:, 2] > cycles[:, 1]) & (cycles[:, 3] >= cycles[:, 2])
@@ -125,7 +125,7 @@ def cycle_rows(record: RawRecord, stalls: Times) -> list[Row]:
     ]
 
 
-def wake_rows(record: RawRecord) -> list[Row]:
+def wake_rows(record: RealtimeRecord) -> list[Row]:
     """Return the rows on wake-up latency; ratios are medians over the windows."""
     ratio = {
         q: statistics.median(
@@ -157,7 +157,7 @@ def wake_rows(record: RawRecord) -> list[Row]:
     ]
 
 
-def miss_rows(record: RawRecord, stalls: Times) -> list[Row]:
+def miss_rows(record: RealtimeRecord, stalls: Times) -> list[Row]:
     """Return the rows on missed cycles."""
     count = len(record.cycles())
     in_loop = np.concatenate([missed(window.cycles) for window in record.loops])
@@ -183,7 +183,7 @@ def miss_rows(record: RawRecord, stalls: Times) -> list[Row]:
     ]
 
 
-def use_rows(record: RawRecord) -> list[Row]:
+def use_rows(record: RealtimeRecord) -> list[Row]:
     """Return the rows on processor use, memory and the recorder."""
     loop, recorder = record.cpu("control"), record.cpu("recorder")
     faults = sum(use_of(r, "control").page_faults for r in record.reports)

@@ -36,7 +36,7 @@ _LINEAR = 1.25
 _REPEATS = 3
 
 
-def made_trials(count: int) -> dict[str, list[Any]]:
+def generated_trials(count: int) -> dict[str, list[Any]]:
     """Return generated trials on eight terrains, with kept samples only."""
     noise = np.random.default_rng(count)
     trials: dict[str, list[Any]] = {}
@@ -51,7 +51,7 @@ def made_trials(count: int) -> dict[str, list[Any]]:
 
 def folds_of(count: int) -> dict[str, float]:
     """Return the cost of planning the folds of `count` trials, and a fold's size."""
-    trials, times = made_trials(count), []
+    trials, times = generated_trials(count), []
     for _ in range(_REPEATS):
         start = time.process_time()
         tasks, _ = plan_folds(trials, FitOptions())

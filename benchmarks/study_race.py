@@ -43,7 +43,7 @@ FITS = {
 }
 
 
-class Given(NamedTuple):
+class FoldRows(NamedTuple):
     """Training data of the Gaussian processes of one fold.
 
     Attributes:
@@ -115,7 +115,7 @@ def folds_of(path: Path) -> list[FoldTask]:
     return plan_folds(trials, FitOptions())[0]
 
 
-def given(task: FoldTask) -> Given:
+def fold_rows(task: FoldTask) -> FoldRows:
     """Return the training data of the Gaussian processes of one fold."""
     training = TrainingSet(task.training, task.lengths, choose_rows(task))
     curve = ModelFitter(training, task.options).curve()
@@ -123,7 +123,7 @@ def given(task: FoldTask) -> Given:
     plain = subset.F_t - subset.F_t.mean()
     residual = subset.F_t - curve.mean(subset.F_n, subset.v_t)
     centre, scale = subset.inputs.mean(axis=0), subset.inputs.std(axis=0)
-    return Given(
+    return FoldRows(
         curve=curve,
         centre=centre,
         scale=scale,
@@ -189,7 +189,7 @@ def likelihoods_of(laps: list[FoldTimes]) -> tuple[np.ndarray, np.ndarray]:
 
 def starts_of(task: FoldTask) -> dict[str, tuple[Array, ...]]:
     """Return the starts of the searches of one fold, by name of the model."""
-    rows = given(task)
+    rows = fold_rows(task)
     return {n: three_starts(FITS[n][0], rows.X, r) for n, r in rows.outputs.items()}
 
 
@@ -197,7 +197,7 @@ def run_sklearn(
     task: FoldTask, starts: dict[str, tuple[Array, ...]]
 ) -> dict[str, float]:
     """Fit and predict one fold with scikit-learn; return the log likelihoods."""
-    rows = given(task)
+    rows = fold_rows(task)
     foreign = [trial for trials in task.others.values() for trial in trials]
     tested = rows.standardised(SampleTable.joined([task.training, *foreign]))
     held_out = rows.standardised(SampleTable.joined(task.test_trials))

@@ -18,7 +18,7 @@ class WorldClock:
         self._world_ns = self._machine_ns = clock.now_ns()
 
     def now_ns(self) -> int:
-        """Return the world's time at the last call of `go_on` [ns]."""
+        """Return the world's time at the last call of `advance_to_now` [ns]."""
         return self._world_ns
 
     def utc_ns(self) -> int:
@@ -33,7 +33,7 @@ class WorldClock:
         """Wait for data; return True if `link` is readable, False at the deadline."""
         return self._clock.wait(link, self._machine_time(deadline_ns))
 
-    def go_on(self) -> int:
+    def advance_to_now(self) -> int:
         """Advance the world's time and return it."""
         now_ns = self._clock.now_ns()
         self._world_ns += min(now_ns - self._machine_ns, _LONGEST_STEP_NS)

@@ -21,7 +21,7 @@ _LENGTH = struct.Struct("<I")
 _ASKED_AT, _ANSWERED_AT = 0, 64
 FRAMES_IN_AT, FRAMES_OUT_AT = 0x1000, 0x2000
 _BYTES_IN_AT, _BYTES_OUT_AT, _TEXT_AT = 0x4000, 0x10000, 0x20000
-MOST_BYTES = 0x8000
+MAX_BYTES = 0x8000
 
 Frame = tuple[int, bytes]  # identifier, data
 Memory = mmap.mmap | bytearray
@@ -62,7 +62,7 @@ class Exchange:
             ValueError: it exceeds the size of the memory.
         """
         t_ns, count, size = _PART.unpack_from(self._memory, _ASKED_AT)
-        if count > MAX_FRAMES or size > MOST_BYTES:
+        if count > MAX_FRAMES or size > MAX_BYTES:
             raise ValueError(f"a call with {count} frames and {size} bytes.")
         end = FRAMES_IN_AT + count * FRAME.size
         rows = FRAME.iter_unpack(self._memory[FRAMES_IN_AT:end])
@@ -80,7 +80,7 @@ class Exchange:
         Raises:
             ValueError: it exceeds the size of the memory.
         """
-        if len(frames) > MAX_FRAMES or len(data) > MOST_BYTES:
+        if len(frames) > MAX_FRAMES or len(data) > MAX_BYTES:
             raise ValueError(f"an answer of {len(frames)} frames, {len(data)} bytes.")
         packed = b"".join(FRAME.pack(can_id, len(d), d) for can_id, d in frames)
         self._memory[FRAMES_OUT_AT : FRAMES_OUT_AT + len(packed)] = packed

@@ -104,7 +104,7 @@ class PoweredTestLimits:
         """Return the travel limit of joint 1-7 while another is pushed [rad]."""
         return self.partner if PARTNERS.get(pushed) == joint else self.aside
 
-    def ways(self, goal: PoweredTestGoal) -> list[tuple[float, float]]:
+    def travel_limits(self, goal: PoweredTestGoal) -> list[tuple[float, float]]:
         """Return the travel limits (low, high) of each joint from its start [rad]."""
         if goal.kind in (PoweredTestKind.REST, PoweredTestKind.SILENCE):
             return [(-way, way) for way in self.rest]

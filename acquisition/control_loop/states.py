@@ -145,18 +145,18 @@ class ControlStatus:
     others: tuple[GuardVerdict, ...] = ()
 
     @property
-    def standing(self) -> tuple[GuardVerdict, ...]:
+    def active_verdicts(self) -> tuple[GuardVerdict, ...]:
         """All active verdicts, the strictest first."""
         return () if self.verdict is None else (self.verdict, *self.others)
 
     @property
     def is_idled(self) -> bool:
         """Whether an active verdict idles the arm."""
-        return any(verdict.action is Action.IDLE for verdict in self.standing)
+        return any(verdict.action is Action.IDLE for verdict in self.active_verdicts)
 
     def latch(self, verdict: GuardVerdict) -> None:
         """Activate a verdict unless its fault is active with at least its severity."""
-        standing = self.standing
+        standing = self.active_verdicts
         if any(
             verdict.fault is other.fault and verdict.severity <= other.severity
             for other in standing

@@ -170,7 +170,7 @@ class StatusSlot:
     def write(self, status: LoopStatus) -> None:
         """Publish `status`."""
         control = status.control
-        standing = control.standing
+        standing = control.active_verdicts
         if standing != self._verdicts:
             self._verdicts = standing
             self._text = _text_of(standing)

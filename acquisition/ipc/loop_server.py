@@ -123,7 +123,7 @@ class LoopServer:
     def _publish_metadata(self) -> None:
         self._shared.health.write(json.dumps(dict(self._hooks.metadata())).encode())
 
-    def orphan(self) -> None:
+    def on_console_death(self) -> None:
         """React to the death of the console: hold, then idle, then end the loop."""
         self._is_orphaned = True
 

@@ -140,7 +140,7 @@ class RecordedTrial:
         age = float(np.median(ages[fresh])) * 1e-9 if fresh.any() else 0.0
         return age if abs(age) < _LONGEST_AGE else 0.0
 
-    def interpolated(self) -> "RecordedTrial":
+    def with_interpolated_tare(self) -> "RecordedTrial":
         """Return the trial with the sensor's zero interpolated between its two tares.
 
         Without both tares the trial is returned unchanged.

@@ -6,7 +6,10 @@ from typing import Any, NamedTuple, cast
 
 from analysis.data.terrain_kinds import Value
 
-MOST, LONGEST = 13, 60  # factors, the foot among them; characters of names and words
+MAX_FACTORS, MAX_NAME_LENGTH = (
+    13,
+    60,
+)  # factors, the foot among them; characters of names and words
 _LARGEST = 1e12
 _FEET = {"true": "tread", "false": "bare"}  # as the first recordings state a foot
 FOOT = "foot"
@@ -45,16 +48,16 @@ def stated_factors(trial: Mapping[str, str]) -> StatedFactors:
     """Return the factors in a trial's metadata; invalid entries are dropped."""
     foot = trial.get(FOOT) or foot_of(trial.get("tread", ""))
     values = checked_factors(_parsed(trial.get("factors", "")))
-    factors = {**values, FOOT: foot[:LONGEST]} if foot else values
+    factors = {**values, FOOT: foot[:MAX_NAME_LENGTH]} if foot else values
     texts = _parsed(trial.get("factor_units", ""))
-    units = {k: v[:LONGEST] for k, v in texts.items() if isinstance(v, str)}
+    units = {k: v[:MAX_NAME_LENGTH] for k, v in texts.items() if isinstance(v, str)}
     return StatedFactors(factors, units)
 
 
 def checked_factors(values: Mapping[str, Any]) -> dict[str, Value]:
     """Keep the values that are valid factors: at most 13, finite, short."""
     kept: dict[str, Value] = {}
-    for name, value in list(values.items())[:MOST]:
+    for name, value in list(values.items())[:MAX_FACTORS]:
         if isinstance(value, bool) or not _is_word(name):
             continue
         if value is None or (isinstance(value, str) and _is_word(value)):
@@ -65,7 +68,7 @@ def checked_factors(values: Mapping[str, Any]) -> dict[str, Value]:
 
 
 def _is_word(text: str) -> bool:
-    return 0 < len(text) <= LONGEST and text.isprintable()
+    return 0 < len(text) <= MAX_NAME_LENGTH and text.isprintable()
 
 
 def _parsed(text: str) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from analysis.data.series import Array
 from analysis.gp.kernels import Kernel, SquaredExponential
 from analysis.gp.likelihood import Factor, Likelihood, factorise, lapack, split
 from analysis.gp.noise import ConstantNoise, Noise
-from analysis.gp.search import Start, likeliest, spread
+from analysis.gp.search import Start, maximise_posterior, spread
 from analysis.gp.trial_noise import TrialRows, shared_over
 
 MINIMUM_ROWS = 20
@@ -236,7 +236,7 @@ def fit_gp(
     centre, scale = inputs.mean(axis=0), spread(inputs)
     X, offset = (inputs - centre) / scale, float(y.mean()) if is_centred else 0.0
     likelihood = Likelihood(kernel, noise, X, y - offset, trials)
-    optimum = likeliest(likelihood)
+    optimum = maximise_posterior(likelihood)
     alpha, jitter = likelihood.weights(optimum.theta)
     return GaussianProcess(
         kernel=kernel,

@@ -62,14 +62,14 @@ class Optimum(NamedTuple):
         theta: hyperparameters of largest likelihood.
         lml: log marginal likelihood there, priors included.
         starts: result of every start.
-        began: initial theta of every start.
+        start_points: initial theta of every start.
         at_bound: hyperparameters at a bound of the search.
     """
 
     theta: Array
     lml: float
     starts: tuple[Start, ...]
-    began: tuple[Array, ...]
+    start_points: tuple[Array, ...]
     at_bound: tuple[str, ...]
 
 
@@ -222,7 +222,7 @@ class Search:
         )
 
 
-def likeliest(likelihood: Likelihood) -> Optimum:
+def maximise_posterior(likelihood: Likelihood) -> Optimum:
     """Return the hyperparameters of largest likelihood times the noise's prior."""
     search = Search(likelihood)
     search.climb(search.designed_start())
@@ -258,7 +258,7 @@ def posterior_search(
     trials: TrialRows | None = None,
 ) -> Optimum:
     """Return the hyperparameters of largest likelihood times the noise's prior."""
-    return likeliest(Likelihood(kernel, noise, X, r, trials))
+    return maximise_posterior(Likelihood(kernel, noise, X, r, trials))
 
 
 def distinct_optima(kernel: Kernel, reached: Sequence[Start]) -> list[Array]:

@@ -176,7 +176,7 @@ class TrialLevels:
     levels: Array
 
     @property
-    def do_differ(self) -> bool:
+    def estimates_differ(self) -> bool:
         """Whether the two estimates differ by more than twice the standard error."""
         if self.other is None or self.error is None:
             return False

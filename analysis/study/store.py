@@ -32,7 +32,7 @@ from acquisition.files import open_directory, read_regular, replace_file
 
 Function = Callable[..., Any]
 
-MOST_BYTES = 256 * 1024**2  # size limit of all results; a fold takes about 60 kB
+MAX_STORE_BYTES = 256 * 1024**2  # size limit of all results; a fold takes about 60 kB
 LARGEST = 16 * 1024**2  # bytes of one result; a larger file is ignored
 _KEPT = 0.9  # share of the size limit that remains after a removal
 _ROOT = Path(__file__).parents[2]  # of the sources or the installation
@@ -48,7 +48,7 @@ class ResultStore:
         most: size limit of all results [bytes].
     """
 
-    def __init__(self, folder: Path, most: int = MOST_BYTES) -> None:
+    def __init__(self, folder: Path, most: int = MAX_STORE_BYTES) -> None:
         self._folder = folder
         self._most = most
         self._bytes: int | None = None  # size of the folder, if known

@@ -171,7 +171,7 @@ def fit_components(task: ComponentsTask) -> TrialComponents | None:
         intervals=_intervals(residuals, levels, draws, rng) if draws else {},
         gain=likelihood.gain(theta),
         other=levels.other,
-        do_differ=levels.do_differ,
+        do_differ=levels.estimates_differ,
     )
 
 

@@ -28,7 +28,7 @@ from acquisition.files import UnfitFileError, open_regular, read_regular
 from acquisition.formats import format_problem
 from acquisition.validation import Many, first_problem
 from analysis.data.memory import share_of_memory
-from analysis.data.recorded_factors import MOST, checked_factors
+from analysis.data.recorded_factors import MAX_FACTORS, checked_factors
 from analysis.data.terrain_kinds import Value
 
 DESCRIPTOR = "datapackage.json"
@@ -66,7 +66,9 @@ class TableOrigin(BaseModel):
     terrain: str = ""
     stones: str = Field(default="", max_length=60)
     incline_deg: float | None = Field(default=None, ge=-90, le=90)
-    factors: dict[str, Any] = Field(default_factory=dict[str, Any], max_length=MOST)
+    factors: dict[str, Any] = Field(
+        default_factory=dict[str, Any], max_length=MAX_FACTORS
+    )
     force_age: float = Field(default=0.0, ge=-1, le=1)
     simulated: bool = False
     recording: str = Field(default="", max_length=64)

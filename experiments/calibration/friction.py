@@ -6,7 +6,7 @@ import numpy as np
 
 from experiments.calibration.calibration import CalibrationContext, GuidedCalibration
 from experiments.calibration.joint_table import show_joints
-from experiments.calibration.moving import arrivals
+from experiments.calibration.pose_arrivals import arrivals
 from experiments.rig.law_calibrations import friction_path
 from experiments.run.pose_walk import PoseWalk
 from experiments.session.store import iso_utc
@@ -57,7 +57,7 @@ def collect(context: CalibrationContext) -> RecordedLegs:
 
     def plan(start: Array, space: FreeSpace) -> list[MeasurementPose]:
         legs.extend(plan_friction(rig.model, start, space))
-        return [leg.halt for leg in legs]
+        return [leg.waypoint for leg in legs]
 
     walk = PoseWalk(context.console_loop, is_free=True)
     recorded = RecordedLegs([], [])

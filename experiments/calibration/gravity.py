@@ -7,7 +7,7 @@ import numpy as np
 
 from experiments.calibration.calibration import CalibrationContext, GuidedCalibration
 from experiments.calibration.joint_table import show_joints
-from experiments.calibration.moving import arrivals
+from experiments.calibration.pose_arrivals import arrivals
 from experiments.operator.console import Console
 from experiments.rig.law_calibrations import gravity_path
 from experiments.run.pose_walk import PoseWalk

@@ -10,7 +10,7 @@ from experiments.arguments import (
     asked_time,
     friction_share,
 )
-from experiments.rig.truth_options import add_truth, check_truth, mount_of
+from experiments.rig.deviation_options import add_truth, check_truth, mount_of
 
 if TYPE_CHECKING:
     import argparse

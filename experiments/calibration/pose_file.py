@@ -10,7 +10,7 @@ from acquisition.errors import SettingsError
 from acquisition.settings import Near, SettingsSection, parse_toml, read_text
 from acquisition.validation import first_problem
 from experiments.rig.build import build_tool
-from experiments.run.surroundings import free_space
+from experiments.run.free_space_of_rig import free_space
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
 from wam.calibration.free_space import check_poses

@@ -12,7 +12,7 @@ from acquisition.errors import PreflightError
 from acquisition.ipc.layout import WRENCH_SLOTS
 from acquisition.sample import Record
 from experiments.calibration.calibration import CalibrationContext, GuidedCalibration
-from experiments.calibration.moving import arrivals
+from experiments.calibration.pose_arrivals import arrivals
 from experiments.rig.rig import Rig
 from experiments.run.pose_walk import PoseWalk
 from experiments.session.store import iso_utc

@@ -6,7 +6,7 @@ import numpy as np
 
 from acquisition.sample import Record
 from experiments.calibration.calibration import CalibrationContext, GuidedCalibration
-from experiments.calibration.touching import afloat, touch
+from experiments.calibration.touching import floating_arm, touch
 from experiments.run.console_loop import ConsoleLoop
 from experiments.session.store import iso_utc
 from experiments.settings.calibrations import FORCED
@@ -45,7 +45,7 @@ def collect(context: CalibrationContext) -> list[Array]:
         PreflightError: the arm was not activated.
         StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
     """
-    with afloat(context.console_loop):
+    with floating_arm(context.console_loop):
         return _points(context.console_loop)
 
 

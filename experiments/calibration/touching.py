@@ -22,7 +22,7 @@ _T = TypeVar("_T")
 
 
 @contextmanager
-def afloat(console_loop: ConsoleLoop) -> Generator[None]:
+def floating_arm(console_loop: ConsoleLoop) -> Generator[None]:
     """Context of an activated, floating arm, which is laid down at the end.
 
     Raises:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from experiments.arguments import add_time, asked_time, did_you_mean, number_within
-from experiments.rig.truth_options import add_truth, check_truth, mount_of
+from experiments.rig.deviation_options import add_truth, check_truth, mount_of
 
 if TYPE_CHECKING:
     from experiments.operator.console import Console

@@ -126,14 +126,16 @@ def _note_changes(args: argparse.Namespace, files: RecordFolder) -> None:
     from datetime import UTC, datetime
 
     from acquisition.clock import SystemClock
-    from experiments.commissioning.evidence.order import TOLD
+    from experiments.commissioning.evidence.order import REPORTED_BASES
 
     if not files.record.steps:
         return
     now = datetime.fromtimestamp(SystemClock().utc_ns() // 1_000_000_000, UTC)
-    for name, is_reported in zip(TOLD, (args.moved, args.tensioned), strict=True):
+    for name, is_reported in zip(
+        REPORTED_BASES, (args.moved, args.tensioned), strict=True
+    ):
         if is_reported:
-            files.tell(name, now)
+            files.report_change(name, now)
 
 
 def _run_steps(

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from experiments.arguments import number_within, whole_number
-from experiments.rig.truth_options import add_truth, truth_of
+from experiments.rig.deviation_options import add_truth, truth_of
 
 if TYPE_CHECKING:
     from experiments.operator.console import Console

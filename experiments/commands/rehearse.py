@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from experiments.arguments import add_simulated_arm, friction_share
-from experiments.rig.truth_options import add_truth, mount_of
+from experiments.rig.deviation_options import add_truth, mount_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -83,7 +83,7 @@ def _print(
     plan: AcceptancePlan, results: Sequence[BandResult], folder: Path, console: Console
 ) -> int:
     from experiments.operator.console import BAD, GOOD
-    from experiments.rehearsal.judging import gated
+    from experiments.rehearsal.judging import deciding_bands
 
     rows = [
         [
@@ -98,7 +98,7 @@ def _print(
     failed = {finding.band.id for finding in results if not finding.is_met}
     summary = f"{len(results) - len(failed)} of {len(results)} bands met"
     console.say(f"{summary}. {folder / 'bands.json'}")
-    deciding = [f.band.id for f in gated(plan, results) if f.band.id in failed]
+    deciding = [f.band.id for f in deciding_bands(plan, results) if f.band.id in failed]
     if undecided := sorted(failed.difference(deciding)):
         words = ", ".join(undecided)
         console.say(f"Outside: {words}; not gated at friction {plan.friction:g}.")

@@ -150,11 +150,11 @@ def _show_log(args: argparse.Namespace) -> int:
 
 
 def _print_summary(tally: BusSummary, console: Console) -> None:
-    silent = sum(tally.silent.values())
+    silent = sum(tally.unanswered.values())
     console.say(
         f"{tally.frames} frames, {tally.foreign} of other kinds. {tally.questions} "
         f"answers requested: {tally.answers} came, {tally.late} of them after more "
-        f"than 1 ms, {silent} did not come; {tally.unasked} came without a request."
+        f"than 1 ms, {silent} did not come; {tally.unsolicited} came without a request."
     )
     if tally.gaps:
         longest = tally.longest_gap_ns / 1e9
@@ -171,5 +171,5 @@ def _print_summary(tally: BusSummary, console: Console) -> None:
         console.say(f"Error frames of the controller: {counts}.")
     if tally.answers:
         console.say(f"Slowest answer: {tally.slowest_ns // 1000} us.")
-    for what, count in tally.silent.most_common():
+    for what, count in tally.unanswered.most_common():
         console.say(f"  unanswered {count:6d}  {what}")

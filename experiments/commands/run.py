@@ -11,7 +11,7 @@ from experiments.arguments import (
     data_option,
     friction_share,
 )
-from experiments.rig.truth_options import add_truth, check_truth, mount_of
+from experiments.rig.deviation_options import add_truth, check_truth, mount_of
 
 if TYPE_CHECKING:
     from experiments.run.resume import ResumeRequest

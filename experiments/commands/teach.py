@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     from experiments.calibration.calibration import CalibrationContext, calibrate
     from experiments.calibration.guiding import check_new, guide_person
     from experiments.calibration.options import check_arm
-    from experiments.calibration.place import place_calibration
+    from experiments.calibration.taught_place import place_calibration
     from experiments.settings.load import load_untaught
 
     check_arm(args)

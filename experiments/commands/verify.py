@@ -103,7 +103,7 @@ def _verify_published(folders: list[Path], args: argparse.Namespace) -> int:
     from dataclasses import asdict
 
     from acquisition.errors import SessionError
-    from experiments.export.witnesses import changed_publication
+    from experiments.export.publication_check import changed_publication
     from experiments.operator.console import BAD, GOOD, Console
 
     if len(folders) != 1 or len(args.sessions) != 1:

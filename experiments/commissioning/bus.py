@@ -8,7 +8,7 @@ import numpy as np
 from acquisition.errors import TractionError, UnfitDeviceError
 from acquisition.sample import Flag
 from experiments.commissioning.evidence.order import StepId
-from experiments.commissioning.judging import Judgement, found, judged
+from experiments.commissioning.judging import Judgement, judge_quantity, judged
 from experiments.commissioning.recording import Values, number, texts, words
 from experiments.commissioning.scene import Scene
 from experiments.commissioning.step import Step
@@ -60,10 +60,10 @@ def judge_silence(values: Values) -> Judgement:
     master = int(values["master"])
     return judged(
         [
-            found("masters", int(master >= 0), id=max(master, 0)),
-            found("error_frames", number(values, "error_frames")),
-            found("frames", number(values, "frames")),
-            found("listened", number(values, "seconds")),
+            judge_quantity("masters", int(master >= 0), id=max(master, 0)),
+            judge_quantity("error_frames", number(values, "error_frames")),
+            judge_quantity("frames", number(values, "frames")),
+            judge_quantity("listened", number(values, "seconds")),
         ]
     )
 
@@ -115,7 +115,7 @@ def _expected(rig: Rig) -> str:
     return "" if rig.is_simulated else read_properties(rig.settings)
 
 
-def told(values: Values) -> dict[str, list[int | None]]:
+def reported_properties(values: Values) -> dict[str, list[int | None]]:
     """Return the properties of the seven pucks by name; None = no reply."""
     rows = values["properties"].tolist()
     return {
@@ -126,7 +126,7 @@ def told(values: Values) -> dict[str, list[int | None]]:
 
 def serials_of(values: Values) -> list[int | None]:
     """Return the serial numbers of pucks 1 to 7; [] = not read."""
-    return told(values).get("SN", [])
+    return reported_properties(values).get("SN", [])
 
 
 def commissioned_with(values: Values) -> list[int | None]:
@@ -162,7 +162,7 @@ def judge_identity(values: Values) -> Judgement:
         zip(values["asked"].tolist(), values["answers"].tolist(), strict=True)
     )
     motors = [counts.get(node, 0) for node in MOTOR_NODES]
-    properties = told(values)
+    properties = reported_properties(values)
     complete = len(values["properties"]) == len(MOTOR_NODES)
     (table_text,) = words(values, "expected")
     table = (
@@ -174,16 +174,16 @@ def judge_identity(values: Values) -> Judgement:
     refusal, replaced = words(values, "refusal"), _replaced(values)
     serials = [serial for serial in properties.get("SN", []) if serial is not None]
     rows = [
-        found("module", int(counts.get(SAFETY_NODE, 0) > 0)),
-        found("nodes", sum(count > 0 for count in motors)),
-        found("twice", max(*counts.values(), 0)),
-        found("properties", len(severe), text="; ".join(severe)),
-        found("replaced", len(replaced), text="; ".join(replaced)),
-        found("module_limits", len(ignored), text=" ".join(ignored)),
-        found("refused", len(refusal), text=" ".join(refusal)),
+        judge_quantity("module", int(counts.get(SAFETY_NODE, 0) > 0)),
+        judge_quantity("nodes", sum(count > 0 for count in motors)),
+        judge_quantity("twice", max(*counts.values(), 0)),
+        judge_quantity("properties", len(severe), text="; ".join(severe)),
+        judge_quantity("replaced", len(replaced), text="; ".join(replaced)),
+        judge_quantity("module_limits", len(ignored), text=" ".join(ignored)),
+        judge_quantity("refused", len(refusal), text=" ".join(refusal)),
     ]
     if complete and len(serials) == len(MOTOR_NODES):
-        rows.append(found("serials", len(set(serials))))
+        rows.append(judge_quantity("serials", len(set(serials))))
     advice = [diff.text for diff in differences if diff.is_warning]
     return judged(rows, [*advice, *_temperatures(values)])
 
@@ -220,12 +220,12 @@ def judge_timing(values: Values) -> Judgement:
     """Judge a recording of `time_replies`."""
     return judged(
         [
-            found("answered", number(values, "unasked")),
-            found("late", number(values, "late")),
-            found("jumps", number(values, "jumps")),
-            found("answer", number(values, "answer_ns") / 1e6),
-            found("cycles", number(values, "cycles")),
-            found("incomplete", number(values, "incomplete")),
+            judge_quantity("answered", number(values, "unasked")),
+            judge_quantity("late", number(values, "late")),
+            judge_quantity("jumps", number(values, "jumps")),
+            judge_quantity("answer", number(values, "answer_ns") / 1e6),
+            judge_quantity("cycles", number(values, "cycles")),
+            judge_quantity("incomplete", number(values, "incomplete")),
         ]
     )
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from experiments.commissioning.evidence.order import StepId
-from experiments.commissioning.judging import Judgement, found, judged
+from experiments.commissioning.judging import Judgement, judge_quantity, judged
 from experiments.commissioning.recording import Values, number, texts, words
 from experiments.commissioning.scene import Scene
 from experiments.commissioning.step import Step
@@ -30,9 +30,9 @@ def judge(values: Values) -> Judgement:
     unusual = words(values, "unusual")
     return judged(
         [
-            found("unusual", len(unusual), text="; ".join(unusual)),
-            found("load", number(values, "load")),
-            found("drawings", float(values["gravity_apart"].max())),
+            judge_quantity("unusual", len(unusual), text="; ".join(unusual)),
+            judge_quantity("load", number(values, "load")),
+            judge_quantity("drawings", float(values["gravity_apart"].max())),
         ]
     )
 

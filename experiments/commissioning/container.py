@@ -12,7 +12,7 @@ from acquisition.errors import SettingsError
 from experiments.calibration.calibration import CalibrationContext
 from experiments.calibration.terrain import TERRAIN
 from experiments.commissioning.evidence.order import StepId
-from experiments.commissioning.judging import Judgement, found, judged
+from experiments.commissioning.judging import Judgement, judge_quantity, judged
 from experiments.commissioning.recording import Values, number
 from experiments.commissioning.scene import Scene
 from experiments.commissioning.step import Step
@@ -42,7 +42,7 @@ def judge(values: Values) -> Judgement:
     try:
         fit = fit_terrain(values["points"])
     except SettingsError as error:
-        return judged([found("corners", 0.0, text=error.message)])
+        return judged([judge_quantity("corners", 0.0, text=error.message)])
     touched, far_end = fit.frame, values["far_end"]
     difference = touched.heading - number(values, "heading")
     turned = (difference + np.pi) % (2.0 * np.pi) - np.pi
@@ -50,12 +50,12 @@ def judge(values: Values) -> Judgement:
     away = float(np.linalg.norm(np.subtract(touched.far_end, far_end)))
     return judged(
         [
-            found("corners", 1.0, text=""),
-            found("flat", 1e3 * fit.residual),
-            found("incline", float(np.degrees(tilted))),
-            found("heading", float(np.degrees(turned))),
-            found("far_end", 1e3 * away),
-            found("short", 1e3 * (number(values, "travel") - touched.travel)),
+            judge_quantity("corners", 1.0, text=""),
+            judge_quantity("flat", 1e3 * fit.residual),
+            judge_quantity("incline", float(np.degrees(tilted))),
+            judge_quantity("heading", float(np.degrees(turned))),
+            judge_quantity("far_end", 1e3 * away),
+            judge_quantity("short", 1e3 * (number(values, "travel") - touched.travel)),
         ]
     )
 

@@ -26,7 +26,12 @@ from experiments.commissioning.evidence.gate import lacks, require
 from experiments.commissioning.evidence.order import BASES, StepId
 from experiments.commissioning.fits import angle, fit_foot, orientations
 from experiments.commissioning.guide import RecordFolder
-from experiments.commissioning.judging import Found, Judgement, found, judged
+from experiments.commissioning.judging import (
+    JudgedQuantity,
+    Judgement,
+    judge_quantity,
+    judged,
+)
 from experiments.commissioning.recording import (
     Values,
     number,
@@ -190,22 +195,24 @@ def judge(values: Values) -> Judgement:
     changed, replies = words(values, "changed"), values["replies_ns"]
     master = int(number(values, "heard_master"))
     rows = [
-        found("masters", int(master >= 0), id=max(master, 0)),
-        found("error_frames", number(values, "heard_error_frames")),
-        found("frames", number(values, "heard_frames")),
-        found("changed", len(changed), text=", ".join(changed)),
-        found("answered", number(values, "unasked")),
-        found("late", number(values, "late")),
-        found("answer", number(values, "answer_ns") / 1e6),
-        found("exchange", float(np.median(replies)) / 1e6 if len(replies) else 99.0),
+        judge_quantity("masters", int(master >= 0), id=max(master, 0)),
+        judge_quantity("error_frames", number(values, "heard_error_frames")),
+        judge_quantity("frames", number(values, "heard_frames")),
+        judge_quantity("changed", len(changed), text=", ".join(changed)),
+        judge_quantity("answered", number(values, "unasked")),
+        judge_quantity("late", number(values, "late")),
+        judge_quantity("answer", number(values, "answer_ns") / 1e6),
+        judge_quantity(
+            "exchange", float(np.median(replies)) / 1e6 if len(replies) else 99.0
+        ),
     ]
     if values["zero"].size:
-        rows.append(found("zero", np.degrees(np.abs(values["zero"]).max())))
+        rows.append(judge_quantity("zero", np.degrees(np.abs(values["zero"]).max())))
     rows += [*_hanging_rows(values), *_lying_rows(values)]
     return judged(rows)
 
 
-def _hanging_rows(values: Values) -> list[Found]:
+def _hanging_rows(values: Values) -> list[JudgedQuantity]:
     """Judge the foot's weight compared with the one that C6 fitted.
 
     The sensor's bias changes from day to day: it is fitted over the poses.
@@ -217,12 +224,12 @@ def _hanging_rows(values: Values) -> list[Found]:
     residuals = residuals - residuals.mean(axis=0)
     degrees = residuals.size - residuals.shape[1]  # of freedom
     return [
-        found("hang_force", float(np.sqrt((residuals**2).sum() / degrees))),
-        found("hang_way", angle(fit_foot(values).weight, weight)),
+        judge_quantity("hang_force", float(np.sqrt((residuals**2).sum() / degrees))),
+        judge_quantity("hang_way", angle(fit_foot(values).weight, weight)),
     ]
 
 
-def _lying_rows(values: Values) -> list[Found]:
+def _lying_rows(values: Values) -> list[JudgedQuantity]:
     rest, ramp = _part(values, "rest_"), _part(values, "ramp_")
     if not rest:
         return []
@@ -235,7 +242,7 @@ def _lying_rows(values: Values) -> list[Found]:
     lifted = rest_pose.liftoffs(ramp)
     pairs = zip(LIFTED, values["reference_lifted"].tolist(), strict=True)
     drifts = [
-        found("drift", lifted.get(joint, 0.0) / before, joint=abs(joint))
+        judge_quantity("drift", lifted.get(joint, 0.0) / before, joint=abs(joint))
         for joint, before in pairs
     ]
     return [*rows, *drifts]

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from experiments import provenance
-from experiments.commissioning import bus, by_hand
+from experiments.commissioning import bus, manual_joints
 from experiments.commissioning.evidence.gate import lacks, require
 from experiments.commissioning.evidence.inputs import inputs_of
 from experiments.commissioning.evidence.order import StepId
@@ -59,7 +59,7 @@ class RecordFolder:
         self.record = self.record.with_step(done)
         write_commissioning(self.folder, self.record)
 
-    def tell(self, name: str, when: datetime) -> None:
+    def report_change(self, name: str, when: datetime) -> None:
         """Write that a person reported a change of a basis of `order.BASES`."""
         self.record = self.record.with_reported_change(name, when)
         write_commissioning(self.folder, self.record)
@@ -91,7 +91,7 @@ def do_step(scene: Scene, step: Step, files: RecordFolder, operator: str) -> Jud
     by_hand_before = files.record.of(StepId.BY_HAND)
     if by_hand_before is not None and by_hand_before.raw:
         stops = read_raw(files.folder, by_hand_before.raw[0])
-        scene.stops = by_hand.stop_errors(stops)
+        scene.stops = manual_joints.stop_errors(stops)
     started = _now(scene.rig)
     values = step.collect(scene)
     judgement = step.judge(values)

@@ -34,7 +34,7 @@ class Limit:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class JudgedQuantity:
     """A quantity with its limits and its diagnosis.
 
     Attributes:
@@ -76,14 +76,14 @@ def _read_limits() -> dict[str, Limit]:
 LIMITS: Mapping[str, Limit] = _read_limits()
 
 
-def found(
+def judge_quantity(
     key: str,
     value: float,
     *,
     low: float | None = None,
     high: float | None = None,
     **fields: object,
-) -> Found:
+) -> JudgedQuantity:
     """Return a quantity with its limits.
 
     Args:
@@ -101,10 +101,12 @@ def found(
         low=limit.low if low is None else low,
         high=limit.high if high is None else high,
     )
-    return Found(measured, limit.wrong.format(**fields) if fields else limit.wrong)
+    return JudgedQuantity(
+        measured, limit.wrong.format(**fields) if fields else limit.wrong
+    )
 
 
-def judged(rows: Sequence[Found], notes: Sequence[str] = ()) -> Judgement:
+def judged(rows: Sequence[JudgedQuantity], notes: Sequence[str] = ()) -> Judgement:
     """Return the judgement of a step; its cause is the first quantity that fails."""
     first = next((row for row in rows if not row.measured.is_within), None)
     cause = "" if first is None else f"{first.measured.text}. {first.wrong}"

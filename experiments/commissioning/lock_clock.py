@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.ipc.shared_sensor import unpack_wrenches
-from experiments.commissioning.by_hand import CARRY_SECONDS
 from experiments.commissioning.evidence.order import StepId
 from experiments.commissioning.fits import orientations
-from experiments.commissioning.judging import Judgement, found, judged
+from experiments.commissioning.judging import Judgement, judge_quantity, judged
+from experiments.commissioning.manual_joints import CARRY_SECONDS
 from experiments.commissioning.recording import Values, number, texts, words
 from experiments.commissioning.scene import Scene
 from experiments.commissioning.step import Step
@@ -143,16 +143,16 @@ def judge(values: Values) -> Judgement:
     lag, swing = force_lag(values)
     ended = words(values, "ended")
     rows = [
-        found("rocked", swing),
-        found("lag", 1e3 * lag),
-        found("ended", len(ended), text=" ".join(ended)),
+        judge_quantity("rocked", swing),
+        judge_quantity("lag", 1e3 * lag),
+        judge_quantity("ended", len(ended), text=" ".join(ended)),
     ]
     if not ended:
         stiffness, turned = lock_stiffness(values)
         rows += [
-            found("turned", turned),
-            found("stiffness", stiffness),
-            found("ringing", ringing(values)),
+            judge_quantity("turned", turned),
+            judge_quantity("stiffness", stiffness),
+            judge_quantity("ringing", ringing(values)),
         ]
     return judged(rows)
 

@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 
 from experiments.commissioning.bus import IDENTITY, LISTEN, TIMING
-from experiments.commissioning.by_hand import BY_HAND
 from experiments.commissioning.configuration import CONFIGURATION
 from experiments.commissioning.container import CONTAINER
 from experiments.commissioning.evidence.order import StepId
 from experiments.commissioning.lock_clock import LOCK_AND_CLOCK
+from experiments.commissioning.manual_joints import BY_HAND
 from experiments.commissioning.rest_pose import (
     GRAVITY_RAMP,
     LIFT,

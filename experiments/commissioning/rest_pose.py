@@ -17,7 +17,12 @@ from acquisition.errors import PreflightError
 from acquisition.sample import MOTOR_FRESH_SHIFT, SAFETY_MODE_MASK
 from acquisition.simulation import PendantAction
 from experiments.commissioning.evidence.order import StepId
-from experiments.commissioning.judging import Found, Judgement, found, judged
+from experiments.commissioning.judging import (
+    JudgedQuantity,
+    Judgement,
+    judge_quantity,
+    judged,
+)
 from experiments.commissioning.recording import Values, texts, words
 from experiments.commissioning.scene import Scene
 from experiments.commissioning.step import Step
@@ -159,7 +164,7 @@ def judge_rest(values: Values) -> Judgement:
     """Judge an active arm without torque, and its module's heartbeat."""
     rows = rest_rows(values)
     if "silent_ns" in values:  # absent after a fault and in the daily check
-        rows.append(found("silence", _braked_after(values)))
+        rows.append(judge_quantity("silence", _braked_after(values)))
     return judged(rows)
 
 
@@ -178,14 +183,16 @@ def _braked_after(values: Values) -> float:
     return float(t_ns[first] - t_ns[last]) * 1e-6
 
 
-def rest_rows(values: Values) -> list[Found]:
+def rest_rows(values: Values) -> list[JudgedQuantity]:
     """Quantities of an active arm without torque."""
     seconds = _seconds(values["t_ns"])
     rows = [
-        found("rest", 1e3 * travel, high=1e3 * POWERED_TEST_LIMITS.rest[i], joint=i + 1)
+        judge_quantity(
+            "rest", 1e3 * travel, high=1e3 * POWERED_TEST_LIMITS.rest[i], joint=i + 1
+        )
         for i, travel in enumerate(_travels(values["q"]))
     ]
-    return [*rows, *_ended_row(values), found("active", seconds)]
+    return [*rows, *_ended_row(values), judge_quantity("active", seconds)]
 
 
 def ramps(scene: Scene, joints: Sequence[int] = PUSHED) -> Values:
@@ -229,10 +236,10 @@ def liftoffs(values: Values) -> dict[int, float]:
     return torques
 
 
-def ramp_rows(values: Values) -> list[Found]:
+def ramp_rows(values: Values) -> list[JudgedQuantity]:
     """Quantities of the ramped joints."""
     lifted = liftoffs(values)
-    rows: list[Found] = []
+    rows: list[JudgedQuantity] = []
     for number, (joint, torque) in enumerate(
         zip(values["joints"].tolist(), values["torques"].tolist(), strict=True)
     ):
@@ -248,7 +255,7 @@ def ramp_rows(values: Values) -> list[Found]:
         )
         other = int((travels / limits).argmax())
         rows.append(
-            found(
+            judge_quantity(
                 "aside",
                 1e3 * travels[other],
                 high=1e3 * limits[other],
@@ -260,11 +267,13 @@ def ramp_rows(values: Values) -> list[Found]:
         travel = sense * (q[:, i] - q[0, i])
         reach = POWERED_TEST_LIMITS.reach[i]
         rows.append(
-            found("moved", 1e3 * travel.max(), low=1e3 * reach, joint=_signed(i, sense))
+            judge_quantity(
+                "moved", 1e3 * travel.max(), low=1e3 * reach, joint=_signed(i, sense)
+            )
         )
         if (needed := lifted.get(int(sense) * (i + 1))) is not None:
             weight = abs(float(values["weights"][i]))
-            rows.append(found("liftoff", needed / weight, joint=i + 1))
+            rows.append(judge_quantity("liftoff", needed / weight, joint=i + 1))
     return [*rows, *_ended_row(values)]
 
 
@@ -291,7 +300,7 @@ def lift(scene: Scene) -> Values:
 
 def judge_lift(values: Values) -> Judgement:
     """Judge the joints' weights: means of up and down, so that friction cancels."""
-    rows: list[Found] = []
+    rows: list[JudgedQuantity] = []
     for number, (joint, torque) in enumerate(
         zip(values["joints"].tolist(), values["torques"].tolist(), strict=True)
     ):
@@ -301,7 +310,7 @@ def judge_lift(values: Values) -> Judgement:
         i, sense = int(joint) - 1, 1.0 if torque > 0 else -1.0
         q, tau = values["q"][part][:, i], sense * values["tau"][part][:, i]
         travel = sense * (q - q[0])
-        rows.append(found("lifted", 1e3 * travel.max(), joint=i + 1))
+        rows.append(judge_quantity("lifted", 1e3 * travel.max(), joint=i + 1))
         low, high = (share * POWERED_TEST_LIMITS.lift_travel for share in _MIDDLE)
         inside = (travel > low) & (travel < high)
         before = np.arange(len(travel)) < int(travel.argmax())
@@ -315,7 +324,9 @@ def judge_lift(values: Values) -> Judgement:
             )
             low, high = 1.0 - tolerance, 1.0 + tolerance
             ratio = weight / predicted
-            rows.append(found("weight", ratio, low=low, high=high, joint=i + 1))
+            rows.append(
+                judge_quantity("weight", ratio, low=low, high=high, joint=i + 1)
+            )
     return judged([*rows, *_ended_row(values)])
 
 
@@ -330,12 +341,16 @@ def judge_gravity_ramp(values: Values) -> Judgement:
     """Judge whether the compensation moves the lying arm."""
     limits = [1e3 * POWERED_TEST_LIMITS.gravity * m for m in POWERED_TEST_LIMITS.rest]
     rows = [
-        found("gravity", 1e3 * travel, high=limits[i], joint=i + 1)
+        judge_quantity("gravity", 1e3 * travel, high=limits[i], joint=i + 1)
         for i, travel in enumerate(_travels(values["q"]))
     ]
     share = _seconds(values["t_ns"]) / _GRAVITY_SECONDS
     return judged(
-        [*rows, *_ended_row(values), found("share", share, text="It ended early")]
+        [
+            *rows,
+            *_ended_row(values),
+            judge_quantity("share", share, text="It ended early"),
+        ]
     )
 
 
@@ -388,9 +403,9 @@ def _seconds(t_ns: NDArray[Any]) -> float:
     return float(t_ns[-1] - t_ns[0]) * 1e-9 if len(t_ns) else 0.0
 
 
-def _ended_row(values: Values) -> list[Found]:
+def _ended_row(values: Values) -> list[JudgedQuantity]:
     ended = words(values, "ended")
-    return [found("ended", len(ended), text=" ".join(ended))]
+    return [judge_quantity("ended", len(ended), text=" ".join(ended))]
 
 
 REST_POSE = Step(

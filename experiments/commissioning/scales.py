@@ -8,7 +8,12 @@ import numpy as np
 
 from experiments.commissioning.evidence.order import StepId
 from experiments.commissioning.fits import orientations
-from experiments.commissioning.judging import Found, Judgement, found, judged
+from experiments.commissioning.judging import (
+    JudgedQuantity,
+    Judgement,
+    judge_quantity,
+    judged,
+)
 from experiments.commissioning.recording import Values, number
 from experiments.commissioning.scene import Scene
 from experiments.commissioning.step import Step
@@ -87,17 +92,17 @@ def judge(values: Values) -> Judgement:
     pressed, pulled = number(values, "pressed"), number(values, "pulled")
     return judged(
         [
-            found("pressed", pressed),
+            judge_quantity("pressed", pressed),
             _difference_row("scale", up - pressed, pressed),
-            found("pulled", pulled),
+            judge_quantity("pulled", pulled),
             _difference_row("balance", level - pulled, pulled),
         ]
     )
 
 
-def _difference_row(key: str, difference: float, shown: float) -> Found:
+def _difference_row(key: str, difference: float, shown: float) -> JudgedQuantity:
     tolerance = _SHARE * abs(shown) + _LEAST
-    return found(key, difference, low=-tolerance, high=tolerance)
+    return judge_quantity(key, difference, low=-tolerance, high=tolerance)
 
 
 PLATE = Step(

@@ -11,7 +11,7 @@ from acquisition.devices import SafetyMode
 from acquisition.errors import PreflightError
 from acquisition.sample import MOTOR_FRESH_SHIFT, SAFETY_MODE_MASK
 from experiments.commissioning.evidence.order import StepId
-from experiments.commissioning.judging import Judgement, found, judged
+from experiments.commissioning.judging import Judgement, judge_quantity, judged
 from experiments.commissioning.recording import Values
 from experiments.commissioning.scene import Scene
 from experiments.commissioning.step import Step
@@ -115,12 +115,12 @@ def judge(values: Values) -> Judgement:
     is_idle = bool(len(mode)) and int(mode[-1]) == SafetyMode.IDLE
     return judged(
         [
-            found("seen", int(values["seen"].sum())),
-            found("early", early / 1e6),
-            found("stop", stopped),
-            found("stays", int((mode[kept] != SafetyMode.E_STOP).sum())),
-            found("idles", int(is_idle)),
-            found("asleep", int(fresh[-1]).bit_count() if len(fresh) else 0),
+            judge_quantity("seen", int(values["seen"].sum())),
+            judge_quantity("early", early / 1e6),
+            judge_quantity("stop", stopped),
+            judge_quantity("stays", int((mode[kept] != SafetyMode.E_STOP).sum())),
+            judge_quantity("idles", int(is_idle)),
+            judge_quantity("asleep", int(fresh[-1]).bit_count() if len(fresh) else 0),
         ]
     )
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from acquisition.errors import PreflightError
 from acquisition.ipc.shared_sensor import unpack_wrenches
-from experiments.commissioning.by_hand import CARRY_SECONDS
 from experiments.commissioning.evidence.order import StepId
 from experiments.commissioning.fits import FITTED, fit_foot, fit_hung
-from experiments.commissioning.judging import Judgement, found, judged
+from experiments.commissioning.judging import Judgement, judge_quantity, judged
+from experiments.commissioning.manual_joints import CARRY_SECONDS
 from experiments.commissioning.recording import Values, number
 from experiments.commissioning.scene import Scene
 from experiments.commissioning.step import Step
@@ -154,12 +154,14 @@ def judge_own_weight(values: Values) -> Judgement:
     centre_error = 1e3 * float(np.linalg.norm(fit.centre - values["centre"]))
     return judged(
         [
-            found("lever", 1e3 * fit.lever),
-            found("force_left", fit.force_left),
-            found("foot_mass", 100.0 * (fit.mass / number(values, "mass") - 1.0)),
-            found("weight_way", fit.way),
-            found("foot_centre", centre_error),
-            found("moment_left", 1e3 * fit.moment_left),
+            judge_quantity("lever", 1e3 * fit.lever),
+            judge_quantity("force_left", fit.force_left),
+            judge_quantity(
+                "foot_mass", 100.0 * (fit.mass / number(values, "mass") - 1.0)
+            ),
+            judge_quantity("weight_way", fit.way),
+            judge_quantity("foot_centre", centre_error),
+            judge_quantity("moment_left", 1e3 * fit.moment_left),
         ]
     )
 
@@ -170,11 +172,13 @@ def judge_hung_weight(values: Values) -> Judgement:
     angles = np.degrees(fit.angles)
     return judged(
         [
-            found("hung_scale", float(np.median(fit.scale))),
-            found("hung_spread", float(np.ptp(fit.scale))),
-            found("fitted", float(angles[fit.worst]), name=FITTED[fit.worst]),
-            found("sole", 1e3 * float(np.linalg.norm(fit.sole - values["sole"]))),
-            found("hung_way", fit.way),
+            judge_quantity("hung_scale", float(np.median(fit.scale))),
+            judge_quantity("hung_spread", float(np.ptp(fit.scale))),
+            judge_quantity("fitted", float(angles[fit.worst]), name=FITTED[fit.worst]),
+            judge_quantity(
+                "sole", 1e3 * float(np.linalg.norm(fit.sole - values["sole"]))
+            ),
+            judge_quantity("hung_way", fit.way),
         ]
     )
 

@@ -36,7 +36,9 @@ TRUTH_BANDS = (
 DOUBT_BAND = Band("T5", "trials that are doubted without a fault", 0, 0)
 
 
-def gated(plan: AcceptancePlan, results: Sequence[BandResult]) -> list[BandResult]:
+def deciding_bands(
+    plan: AcceptancePlan, results: Sequence[BandResult]
+) -> list[BandResult]:
     """Return the bands that decide.
 
     Friction of the wrist suppresses bounce-back: beyond a share of 0.02 its bands are

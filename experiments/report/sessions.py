@@ -12,7 +12,7 @@ from analysis.data.recorded_factors import stated_factors
 from analysis.report.reduced_trial import ReducedTrial, TrialFiles
 from analysis.report.sections.rig_health.health import with_tares
 from analysis.study.models import FitOptions
-from analysis.study.store import MOST_BYTES, ResultStore
+from analysis.study.store import MAX_STORE_BYTES, ResultStore
 from analysis.study.study import Study, StudyOptions, run_study
 from experiments.operator.console import Console
 from experiments.report.choices import ReportRequest, folder_of
@@ -102,7 +102,7 @@ class StudySession:
 def results_below(data: Path) -> ResultStore:
     """Return the result store of a data folder; its size depends on the free space."""
     free = disk_usage(data).free if data.is_dir() else 0
-    return ResultStore(data / FOLDS, max(MOST_BYTES, free // _SHARE_OF_DISK))
+    return ResultStore(data / FOLDS, max(MAX_STORE_BYTES, free // _SHARE_OF_DISK))
 
 
 def study_sessions(

@@ -180,7 +180,11 @@ def _files(
     sessions: Sequence[SessionFolder], states: Mapping[Path, SessionState]
 ) -> ReportTable:
     rows = [
-        (f"{s.path.name}/{kept.place}.mcap", str(kept.size or "?"), kept.sha256 or "?")
+        (
+            f"{s.path.name}/{kept.relative_stem}.mcap",
+            str(kept.size or "?"),
+            kept.sha256 or "?",
+        )
         for s in sessions
         for kept in states[s.path].kept_trials
     ]

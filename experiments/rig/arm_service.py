@@ -34,7 +34,7 @@ from experiments.rig.requests import (
 from wam.bus.link import CanLink
 from wam.driver.arm import WamArm
 from wam.driver.startup import ArmInfo
-from wam.driver.survey import Answers, RestTraffic
+from wam.driver.survey import ReplyCounts, RestTraffic
 
 UNREQUESTED_EVERY = 20  # one cycle in so many omits the position request
 _AGE_CYCLES = 5  # cycles without requests at the end
@@ -123,7 +123,7 @@ class ArmService:
         """See `Listen`."""
         return self.arm.survey().listen(round(seconds * NS_PER_S))
 
-    def count_answers(self, times: int) -> Answers:
+    def count_answers(self, times: int) -> ReplyCounts:
         """See `CountAnswers`."""
         return self.arm.survey().count_answers(times)
 

@@ -227,12 +227,12 @@ class LawParts:
 
     Attributes:
         model: the arm with its tool, for everything but gravity.
-        weighed: gravity model of the control law.
+        gravity_model: gravity model of the control law.
         compensation: friction compensation; None = none.
     """
 
     model: ArmModel
-    weighed: ArmModel
+    gravity_model: ArmModel
     compensation: FrictionCompensation | None
 
 
@@ -286,7 +286,7 @@ def build_loop_server(parts: LoopConfig) -> LoopServer:
 
     frame = terrain_frame(parts.row)
     law = FootController(
-        parts.law.weighed,
+        parts.law.gravity_model,
         control.virtual_mass,
         LockGains(kp=control.lock_kp, kd=control.lock_kd),
         SoftWalls(build_walls(parts.rig, model.constants)),

@@ -9,7 +9,7 @@ from acquisition.control_loop.realtime import Grant
 from acquisition.devices import SafetyMode
 from acquisition.ipc.requests import Request
 from wam.driver.startup import ArmInfo
-from wam.driver.survey import Answers, RestTraffic
+from wam.driver.survey import ReplyCounts, RestTraffic
 
 EXCHANGE_CYCLES = 100  # cycles with a position request
 
@@ -64,7 +64,7 @@ class Listen(Request[RestTraffic]):
 
 
 @dataclass(frozen=True, slots=True)
-class CountAnswers(Request[Answers]):
+class CountAnswers(Request[ReplyCounts]):
     """Count the replies of devices to a request sent `times` times."""
 
     times: int

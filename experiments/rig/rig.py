@@ -167,7 +167,7 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
         backend=backend,
         shared=shared,
         model=law.model,
-        law_model=law.weighed,
+        law_model=law.gravity_model,
         payload=payload,
         tared=payload,
         frame=terrain_frame(row),

@@ -136,7 +136,7 @@ class ControlWorker:
         try:
             while not loop_server.is_over:
                 if self._is_orphaned:
-                    loop_server.orphan()
+                    loop_server.on_console_death()
                 loop.step()
         finally:
             arm = self._service.arm

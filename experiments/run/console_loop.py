@@ -224,7 +224,7 @@ class ConsoleLoop:
 
     def _fault(self, control: ControlStatus) -> ArmFaultError:
         """Return the strictest active verdict as an error; print the others."""
-        strictest, *others = control.standing
+        strictest, *others = control.active_verdicts
         for verdict in others:
             self._print_fault(verdict)
         self._reported.add(strictest.fault)

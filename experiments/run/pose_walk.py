@@ -9,8 +9,8 @@ from acquisition.ipc.shared_sensor import unpack_wrenches
 from experiments.operator.keys import KeyAction, key_action
 from experiments.operator.prompts import Prompt
 from experiments.run.console_loop import TICK, ConsoleLoop
+from experiments.run.free_space_of_rig import free_space
 from experiments.run.stop import ArmFaultError
-from experiments.run.surroundings import free_space
 from wam.calibration.free_space import FreeSpace
 from wam.calibration.poses import APPROACH_SPEED, MeasurementPose, travel_time
 from wam.control.position_control import JointMove, move_reference
@@ -21,10 +21,10 @@ SETTLE = 0.5  # s after a move
 STILL = 0.02  # rad/s, largest joint speed while something is averaged
 # rad, tolerance of the joints during a move; a gravity error of a quarter and the
 # friction of another arm cause 12 mrad.
-ASTRAY = np.array([0.04, 0.04, 0.04, 0.04, 0.04, 0.04, 0.1])
+POSITION_TOLERANCE = np.array([0.04, 0.04, 0.04, 0.04, 0.04, 0.04, 0.1])
 # N, limit of the force on a free foot beyond its weight. A foot of 1 kg on a sensor
 # mounted 5 degrees off causes 1.7 N.
-TOUCH = 3.0
+TOUCH_FORCE = 3.0
 ATTEMPTS = 4  # to find the arm at rest
 
 HaltPlan = Callable[[Array, FreeSpace], Sequence[MeasurementPose]]
@@ -139,12 +139,12 @@ class PoseWalk:
             return
         records = self._rig.backend.loop_client.last(seconds)
         force = float(np.linalg.norm(records["wrench"][:, :3].mean(axis=0)))
-        if force <= TOUCH:
+        if force <= TOUCH_FORCE:
             return
         self.console_loop.make_safe()
         raise PreflightError(
             f"Something pushed the foot with {force:.1f} N during the measurement "
-            f"(limit {TOUCH:g}).",
+            f"(limit {TOUCH_FORCE:g}).",
             hint="Nobody may touch the arm. If nobody did: is the foot's mass in "
             "rig.toml right, and the sensor calibrated? Then start again.",
             arm_state=IDLE_ARM,
@@ -161,13 +161,13 @@ class PoseWalk:
         record = loop_client.latest()[0]
         wanted, _ = move_reference(move, (int(record["host_ns"]) - sent_ns) * 1e-9)
         deviation = np.abs(record["position"] - wanted)
-        joint = int((deviation / ASTRAY).argmax())
-        if deviation[joint] <= ASTRAY[joint]:
+        joint = int((deviation / POSITION_TOLERANCE).argmax())
+        if deviation[joint] <= POSITION_TOLERANCE[joint]:
             return
         self.console_loop.make_safe()
         raise PreflightError(
             f"Joint {joint + 1} is {deviation[joint]:.3f} rad from where it was sent "
-            f"(limit {ASTRAY[joint]:g}).",
+            f"(limit {POSITION_TOLERANCE[joint]:g}).",
             hint="Is something in the way, or has an encoder failed?",
             arm_state=IDLE_ARM,
         )

@@ -42,10 +42,10 @@ from experiments.session.store import SessionFolder
 
 STALE_SHARE = 0.01  # of the cycles
 MIN_EARLIER = 3  # trials needed to call another one an outlier
-ODD = 3.0  # standard deviations
+OUTLIER_DEVIATIONS = 3.0  # standard deviations
 MIN_SPREAD = 0.05  # of the mean; few trials may agree by chance
 CELLS = (4, 4)  # speed and load cells of a coverage
-MANY = 1_000_000_000  # samples, limit of a plausible count
+MAX_SAMPLES = 1_000_000_000  # samples, limit of a plausible count
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +177,9 @@ class Review:
         if len(valid) < MIN_EARLIER:
             return GOOD, words
         mean, spread = float(np.mean(valid)), float(np.std(valid, ddof=1))
-        is_outlier = abs(self.ratio - mean) > ODD * max(spread, MIN_SPREAD * mean)
+        is_outlier = abs(self.ratio - mean) > OUTLIER_DEVIATIONS * max(
+            spread, MIN_SPREAD * mean
+        )
         words += f" ({len(valid)} before: {mean:.2f} ± {spread:.2f})"
         return WARNING if is_outlier else GOOD, words
 
@@ -238,5 +240,7 @@ def cells_of(value: object) -> NDArray[np.int64]:
         counts = np.array(value, np.int64)
     except (ValueError, TypeError, OverflowError):
         counts = np.zeros(0, np.int64)
-    is_map = counts.shape == CELLS and bool((counts >= 0).all() & (counts < MANY).all())
+    is_map = counts.shape == CELLS and bool(
+        (counts >= 0).all() & (counts < MAX_SAMPLES).all()
+    )
     return counts if is_map else np.zeros(CELLS, np.int64)

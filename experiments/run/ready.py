@@ -167,7 +167,7 @@ def _view_last(context: RunContext, name: TrialName) -> None:
         if not kept:
             context.say("There is no trial to look at yet.")
             return
-        path = folder.path / f"{kept[-1].place}.mcap"
+        path = folder.path / f"{kept[-1].relative_stem}.mcap"
         review = context.console_loop.run_in_background(lambda: review_trial(path))
         lines = [f" {mark} {text}" for mark, text in review.lines()]
         context.say_page([f"{path.stem}, recorded before:", *lines])

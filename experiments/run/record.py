@@ -32,7 +32,7 @@ from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.run.trial import EndDetector, PaceMonitor, trial_header
 from experiments.session.sidecar import TrialName, TrialOutcome, recording_of
 from experiments.session.states import Event
-from wam.control.friction_compensation import SWUNG_MOTOR
+from wam.control.friction_compensation import OSCILLATING_MOTOR
 
 HISTORY = 5.0  # s of traction in the sparklines
 _ALL_MOTORS = 0x7F << MOTOR_FRESH_SHIFT
@@ -225,7 +225,7 @@ def _end(
 
 def _friction_lines(devices: Mapping[str, str]) -> list[str]:
     """Lines on a friction compensation that has switched itself off."""
-    motor = devices.get(SWUNG_MOTOR, "0")
+    motor = devices.get(OSCILLATING_MOTOR, "0")
     if motor == "0":
         return []
     return [

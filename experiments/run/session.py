@@ -32,11 +32,11 @@ from experiments.run.trial import SessionMetadata, collect_metadata
 from experiments.session.data_files import write_json, write_text
 from experiments.session.journal import Journal
 from experiments.session.lock import session_lock
+from experiments.session.never_started import remove_never_started
 from experiments.session.recorded_conditions import write_conditions
 from experiments.session.states import Event
 from experiments.session.store import create_session, session_utc_ns
 from experiments.session.summaries import summarise_all_unverified
-from experiments.session.unbegun import remove_never_started
 from experiments.session.upcoming import next_steps
 from experiments.session.where import Where
 from experiments.settings.load import Settings

@@ -113,7 +113,7 @@ def change_verdict(
             )
         remarks = _check_file(journal, name) if verdict == KEEP else []
         journal.append(Event.VERDICT, **fields)
-        path = journal.state.attempt_at(name).place
+        path = journal.state.attempt_at(name).relative_stem
         kept, wanted = len(journal.state.kept), journal.state.wanted
         return [
             *remarks,
@@ -182,7 +182,7 @@ def _check_file(journal: Journal, name: TrialName) -> list[str]:
     """
     attempt = journal.state.attempt_at(name)
     sidecar = sidecar_of(journal.folder, attempt)
-    path = journal.folder.path / f"{attempt.place}.mcap"
+    path = journal.folder.path / f"{attempt.relative_stem}.mcap"
     if not is_there(path) or sha256_of(path) != sidecar.get("sha256"):
         raise SessionError(
             f"{path.name} is missing or is not what was recorded.",

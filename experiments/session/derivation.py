@@ -87,7 +87,10 @@ def _derive_trial(
     folder: SessionFolder, attempt: Attempt, others: Sequence[Attempt]
 ) -> None:
     """Move the files of an attempt to their location and write its sidecar."""
-    target, previous = folder.path / attempt.place, _previous_path(folder, attempt)
+    target, previous = (
+        folder.path / attempt.relative_stem,
+        _previous_path(folder, attempt),
+    )
     has_moved = _is_at_previous_path(folder, attempt, others)
     for suffix in _SUFFIXES if has_moved else ():
         if is_there(_file(previous, suffix)):
@@ -130,7 +133,7 @@ def _is_at_previous_path(
     is_named = _names_attempt(_file(other, ".json"), attempt)
     recording = _file(other, ".mcap")
     is_missing = bool(attempt.sha256) and not is_there(
-        _file(folder.path / attempt.place, ".mcap")
+        _file(folder.path / attempt.relative_stem, ".mcap")
     )
     if not (is_named or is_missing):
         return False
@@ -151,7 +154,7 @@ def _names_attempt(sidecar: Path, attempt: Attempt) -> bool:
 
 def _recording_from_files(folder: SessionFolder, attempt: Attempt) -> dict[str, Any]:
     """Return the figures of a recording that the journal does not state."""
-    stems = folder.path / attempt.place, _previous_path(folder, attempt)
+    stems = folder.path / attempt.relative_stem, _previous_path(folder, attempt)
     for stem in stems:
         if _names_attempt(_file(stem, ".json"), attempt):
             return read_json(_file(stem, ".json"))

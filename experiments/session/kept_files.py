@@ -72,7 +72,7 @@ def _compare(
     events, text = folder.events(), folder.journal_text()
     state = replay(events)
     faults = [(JOURNAL_FILE, fault) for fault in line_faults(text)]
-    if (deviation := contradiction(folder, events)) is not None:
+    if (deviation := name_contradiction(folder, events)) is not None:
         faults.append((deviation.file, deviation.problem))
     judged = {attempt.name for attempt in state.attempts if attempt.verdicts}
     faults += _unknown_to_journal(folder, text, {name.kept for name in judged})
@@ -130,7 +130,9 @@ def _unknown_to_journal(
     return faults
 
 
-def contradiction(folder: SessionFolder, events: Sequence[_Facts]) -> Deviation | None:
+def name_contradiction(
+    folder: SessionFolder, events: Sequence[_Facts]
+) -> Deviation | None:
     """Return how journal or session.json contradict the folder's name, or None.
 
     The name decides for which terrain a session counts, and whether as simulated; both

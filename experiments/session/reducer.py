@@ -344,7 +344,7 @@ def _judge(
 ) -> SessionState:
     """Return the state after a verdict on an attempt."""
     texts = (_text(event, key) for key in ("reason", "who", "utc"))
-    attempt = attempt.judged(Verdict(verdict, *texts))
+    attempt = attempt.with_verdict(Verdict(verdict, *texts))
     pair = (attempt.name.number, attempt.name.attempt)
     kept = state.kept_attempts
     if verdict != KEEP:

@@ -131,7 +131,7 @@ class Attempt:
         return self.name.rejected if self.is_rejected else self.name.kept
 
     @property
-    def place(self) -> str:
+    def relative_stem(self) -> str:
         """`stem` with the folder: "trials/T04"."""
         return f"{'rejected' if self.is_rejected else 'trials'}/{self.stem}"
 
@@ -145,7 +145,7 @@ class Attempt:
         """Size of the recording [bytes]; None if the journal states none."""
         return {**self.recording, **self.sums}.get("size")
 
-    def judged(self, verdict: Verdict) -> Attempt:
+    def with_verdict(self, verdict: Verdict) -> Attempt:
         """Return the attempt with a new verdict; an equal one changes nothing."""
         if verdict == self.verdict:
             return self

@@ -10,9 +10,9 @@ from experiments.session.store import list_sessions
 from experiments.session.summaries import (
     SessionEntry,
     facts_of,
-    glance,
     recorded_facts,
     summarise,
+    summarise_unverified,
 )
 from experiments.session.where import Where
 
@@ -39,7 +39,9 @@ def summarise_sessions(
     seen: list[SessionEntry] = []
     for folder in list_sessions(data):
         is_asked = where.matches(facts_of(folder))
-        summary = summarise(folder, digest) if is_asked else glance(folder)
+        summary = (
+            summarise(folder, digest) if is_asked else summarise_unverified(folder)
+        )
         seen.append(SessionEntry(folder, summary))
     return _counted_once(seen)
 

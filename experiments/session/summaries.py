@@ -98,7 +98,7 @@ class Checksums:
         return self._digests[key]
 
 
-def glance(folder: SessionFolder) -> SessionSummary:
+def summarise_unverified(folder: SessionFolder) -> SessionSummary:
     """Summarise a session without checksums: no trial counts as kept or changed."""
     return summarise(folder, None)
 
@@ -114,7 +114,7 @@ def summarise(
     """
     from experiments.session.kept_files import (
         compare_kept,
-        contradiction,
+        name_contradiction,
         unreadable,
     )
     from experiments.session.lock import owner_of
@@ -134,7 +134,7 @@ def summarise(
             operator=state.operator,
             phase=str(state.phase) if events else "opening",
             deviations=deviations,
-            problem=contradiction(folder, events),
+            problem=name_contradiction(folder, events),
         )
     except TrialFileError as error:
         return SessionSummary(deviations=deviations, problem=unreadable(folder, error))
@@ -142,7 +142,10 @@ def summarise(
 
 def summarise_all_unverified(data: Path) -> list[SessionEntry]:
     """Summarise all sessions below `data` without checksums."""
-    return [SessionEntry(folder, glance(folder)) for folder in list_sessions(data)]
+    return [
+        SessionEntry(folder, summarise_unverified(folder))
+        for folder in list_sessions(data)
+    ]
 
 
 def facts_of(folder: SessionFolder) -> dict[str, Value]:

@@ -20,7 +20,7 @@ from analysis.data.terrain_kinds import Value, ground_of, stones_of
 from experiments.arguments import nearest
 from experiments.settings.explaining import explain, line_of
 from experiments.settings.matrix import (
-    MOST_FACTORS,
+    MAX_FACTORS,
     RESET,
     Angles,
     CellName,
@@ -105,7 +105,7 @@ _VARIED = frozenset(
 class DesignFile(SettingsSection):
     """Content of matrix.toml, cells and crosses not validated yet."""
 
-    factors: tuple[DesignFactor, ...] = Field(default=(), max_length=MOST_FACTORS)
+    factors: tuple[DesignFactor, ...] = Field(default=(), max_length=MAX_FACTORS)
     design: Design = Design()
     defaults: dict[str, Any] = Field(default_factory=dict[str, Any])
     cells: tuple[dict[str, Any], ...] = Field(default=(), max_length=MAX_CELLS)

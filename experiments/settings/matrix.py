@@ -11,7 +11,7 @@ from pydantic import Field, StringConstraints, model_validator
 from acquisition.settings import File, Number, SettingsSection, UsualRange, Whole
 from analysis.data.terrain_kinds import Value, terrain_kind
 
-MOST_FACTORS = 12
+MAX_FACTORS = 12
 LONGEST_WORD = 40
 _Across = Annotated[Number, Field(ge=-1.2, le=1.2), UsualRange(-1.0, 1.0, "m")]
 _Up = Annotated[Number, Field(ge=-0.5, le=1.0), UsualRange(-0.4, 0.6, "m")]

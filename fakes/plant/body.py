@@ -131,7 +131,7 @@ class ArmBody:
         x, z = np.linalg.lstsq(lifted.T, weight[_LIFTED], rcond=0.05)[0].tolist()
         return x, 0.0, z
 
-    def bearing(self, hand: Vector3, sole: Vector3 | None) -> Array:
+    def unsupported_torques(self, hand: Vector3, sole: Vector3 | None) -> Array:
         """Return the gravity torques not supported by motors and forces [N m], (7,).
 
         Args:
@@ -188,7 +188,7 @@ class ArmBody:
         self._force, self._grip, self._pull, self.drives.grip = load
         self._begin_drives(t_ns)
 
-    def go_on(self, steps: int, terrain: Terrain | None) -> None:
+    def advance(self, steps: int, terrain: Terrain | None) -> None:
         """Advance by `steps` substeps within a cycle."""
         for _ in range(steps):
             self._step(terrain)

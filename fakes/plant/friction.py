@@ -150,7 +150,7 @@ class BristleFriction:
             axis=-1,
         )
         self._levels: list[list[float]] = load_and_ripple.tolist()
-        self.bear([0.0] * 7, [0.0] * 7)
+        self.update_load([0.0] * 7, [0.0] * 7)
         self.rest()
 
     def rest(self) -> None:
@@ -159,7 +159,7 @@ class BristleFriction:
         self._keep = [1.0] * 7
         self.take([0.0] * 7)
 
-    def bear(self, angles: Sequence[float], tau: Sequence[float]) -> None:
+    def update_load(self, angles: Sequence[float], tau: Sequence[float]) -> None:
         """Update the dry friction at the present angles and loads.
 
         Args:

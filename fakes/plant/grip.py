@@ -26,7 +26,7 @@ _TURN, _FEEL, _NEAR = 1.0, 0.12, 0.2  # rad/s free, rad/s near a stop; distance 
 _QUICKEST = 0.1  # s; shortest motion to a pose
 
 
-class Ends(NamedTuple):
+class StopAngles(NamedTuple):
     """True joint stops [rad], shapes (7,)."""
 
     lower: Array
@@ -45,7 +45,7 @@ class JointPath(Protocol):
         """Begin at joint positions `q` [rad], shape (7,)."""
         ...
 
-    def go_on(self, q: Array) -> tuple[Array, Array]:
+    def advance(self, q: Array) -> tuple[Array, Array]:
         """Advance by a cycle with joints at `q`; return (angles, speeds), (7,) each."""
         ...
 
@@ -53,7 +53,7 @@ class JointPath(Protocol):
 class PosePath:
     """A minimum-jerk path of all joints to a goal."""
 
-    def __init__(self, goal: Sequence[float], seconds: float, ends: Ends) -> None:
+    def __init__(self, goal: Sequence[float], seconds: float, ends: StopAngles) -> None:
         """Set the `goal` [rad], seven, clipped to the stops plus their deflection."""
         joints = np.array(goal, dtype=np.float64)
         self._goal = np.clip(joints, ends.lower - _GIVE, ends.upper + _GIVE)
@@ -69,7 +69,7 @@ class PosePath:
         """Begin at `q` [rad], shape (7,)."""
         self._start = q.copy()
 
-    def go_on(self, q: Array) -> tuple[Array, Array]:
+    def advance(self, q: Array) -> tuple[Array, Array]:
         """Advance by a cycle; return reference (angles, speeds), shapes (7,)."""
         del q
         self._moved = min(self._moved + _DT, self._seconds)
@@ -82,7 +82,7 @@ class PosePath:
 class StopPath:
     """One joint turned until its stop is felt; the others are held in place."""
 
-    def __init__(self, joint: int, side: Side, ends: Ends) -> None:
+    def __init__(self, joint: int, side: Side, ends: StopAngles) -> None:
         """Set the joint, 1-7, and the side of its stop."""
         self._i = joint - 1
         self._sign = 1.0 if side == "high" else -1.0
@@ -98,7 +98,7 @@ class StopPath:
         """Begin at `q` [rad], shape (7,)."""
         self._wanted = q.copy()
 
-    def go_on(self, q: Array) -> tuple[Array, Array]:
+    def advance(self, q: Array) -> tuple[Array, Array]:
         """Advance by a cycle; return reference (angles, speeds), shapes (7,)."""
         i, rates = self._i, np.zeros(7)
         beyond = self._sign * (q[i] - self._stop)
@@ -138,5 +138,5 @@ class JointGrip:
         if not self._has_begun:
             self._way.begin(q)
             self._has_begun = True
-        wanted, rates = self._way.go_on(q)
+        wanted, rates = self._way.advance(q)
         return GripTorques(bears + _B * rates, _K, _B, wanted.copy(), _STRONGEST)

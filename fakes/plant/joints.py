@@ -207,7 +207,7 @@ class JointDrives:
         if t_ns % BEARING_NS == 0:
             against = zip(self.sent(), self._bristles.torques(speeds), strict=True)
             net = [sent + friction for sent, friction in against]
-            self._bristles.bear(self._j2mp.dot(rows[0]).tolist(), net)
+            self._bristles.update_load(self._j2mp.dot(rows[0]).tolist(), net)
 
     def _stop(self, rows: Array) -> None:
         self._held_at = rows[0]

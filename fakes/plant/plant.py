@@ -16,7 +16,7 @@ from fakes.plant.body import GRIP, NO_GRIP, ArmBody, HandLoad
 from fakes.plant.cables import CableDrives
 from fakes.plant.friction import draw_friction
 from fakes.plant.gauges import Wrench, WristGauges
-from fakes.plant.grip import Ends, JointGrip, PosePath, Side, StopPath
+from fakes.plant.grip import JointGrip, PosePath, Side, StopAngles, StopPath
 from fakes.plant.hand import Hand
 from fakes.plant.joints import JointDrives
 from fakes.plant.model import (
@@ -91,7 +91,7 @@ class ArmPlant:
         self._twist, self._twisted_until_ns = 0.0, 0  # torque about joint 7 [N m], end
         self._twisted = 0.0  # present torque, ramped [N m]
         self._pull: Vector3 | None = None  # external force at the sole [N]
-        self._ends = Ends(constants.q_lower, constants.q_upper)
+        self._ends = StopAngles(constants.q_lower, constants.q_upper)
         self._has_links = False
         self.t_ns = 0
         self.truth: Truth | None = None
@@ -135,7 +135,7 @@ class ArmPlant:
         self._wrist.cable = self._axes.dot(np.array(force, dtype=np.float64))
 
     @property
-    def ends(self) -> Ends:
+    def ends(self) -> StopAngles:
         """True joint stops."""
         return self._ends
 
@@ -154,7 +154,7 @@ class ArmPlant:
             if into_ns == 0:
                 self._begin_cycle()
             steps = min(room_ns, PERIOD_NS - into_ns) // step_ns
-            self._body.go_on(steps, self.terrain)
+            self._body.advance(steps, self.terrain)
             self.t_ns += steps * step_ns
             if self.t_ns % PERIOD_NS == 0:
                 self._end_cycle()
@@ -163,7 +163,7 @@ class ArmPlant:
         """Return encoder counts of the seven motors."""
         counts = self._body.counts()
         if self.wiring is not None:
-            counts = self.wiring.told_of(np.array(counts)).tolist()
+            counts = self.wiring.reported_counts(np.array(counts)).tolist()
         return [floor(count) for count in counts]
 
     def set_torques(self, units: Sequence[int]) -> None:
@@ -300,7 +300,7 @@ class ArmPlant:
         grip = GRIP if self.hand.is_holding and links is None else NO_GRIP
         torques = None
         if links is not None:
-            torques = links.step(self.q, body.bearing(force, self._pull))
+            torques = links.step(self.q, body.unsupported_torques(force, self._pull))
         body.begin_cycle(HandLoad(force, grip, self._pull, torques), self.t_ns)
 
     def _pull_at_sole(self) -> Vector3 | None:

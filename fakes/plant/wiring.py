@@ -44,7 +44,7 @@ class Wiring:
             torques[self.torn - 1] = 0.0
         return [round(unit) for unit in torques.tolist()]
 
-    def told_of(self, counts: Array) -> Array:
+    def reported_counts(self, counts: Array) -> Array:
         """Return the reported counts for true motor positions `counts`, shape (7,)."""
         reported = self.home + self.counts.dot(counts - self.home) + self.shift
         if self.torn:

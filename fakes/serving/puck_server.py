@@ -109,7 +109,7 @@ class PuckServer:
 
     def press(self, action: PendantAction) -> None:
         """Press a button of the pendant now."""
-        self._clock.go_on()
+        self._clock.advance_to_now()
         self.network.pendant(action)
 
     def step(self, tap: Tap | None = None) -> None:
@@ -122,7 +122,7 @@ class PuckServer:
             LinkError: the bus failed.
         """
         self._clock.wait(self._port, self._deadline_ns())
-        now_ns = self._clock.go_on()
+        now_ns = self._clock.advance_to_now()
         for can_id, data in self._port.receive():
             if tap is not None:
                 tap(can_id, data)

@@ -98,7 +98,7 @@ class RigServer:
         if request_fd is not None:
             watched.append(request_fd)
         ready = select.select(watched, [], [], self._wait_time())[0]
-        now_ns = self._clock.go_on()
+        now_ns = self._clock.advance_to_now()
         self._carry_frames(now_ns)
         self._pty.advance(now_ns)
         self._rig.plant.advance(now_ns)
@@ -122,7 +122,7 @@ class RigServer:
         """Return the time until the next planned event [s]."""
         events = [self._wired.next_event_ns(), self._pty.next_event_ns()]
         times = [t for t in events if t is not None]
-        now_ns = self._clock.go_on()
+        now_ns = self._clock.advance_to_now()
         wait_ns = min([t - now_ns for t in times], default=TICK_NS)
         return max(0, min(wait_ns, TICK_NS)) * 1e-9
 

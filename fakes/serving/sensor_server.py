@@ -73,7 +73,7 @@ class SensorServer:
 
     def step(self) -> None:
         """Transfer bytes both ways up to now."""
-        self._pty.advance(self._clock.go_on())
+        self._pty.advance(self._clock.advance_to_now())
 
     def close(self) -> None:
         """Unplug the cable; the path is removed."""

@@ -27,7 +27,7 @@ def _as_wired() -> Array:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class ContainerError:
     """Error of the container's location in its row of the matrix.
 
     Attributes:
@@ -124,7 +124,7 @@ class RigDeviation:
     versions: tuple[tuple[int, int], ...] = ()
     module: ModuleDefects = ModuleDefects()
     bus: BusDefects = BusDefects()
-    place: Place = Place()
+    place: ContainerError = ContainerError()
     typed_foot_mass: float | None = None
 
     def on(self, sound: "RigDeviation") -> "RigDeviation":

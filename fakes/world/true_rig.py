@@ -130,7 +130,7 @@ def wiring_of(
     wiring = Wiring(departure.torque, departure.counts, true_home, shift=shift)
     if not torn:
         return wiring
-    torn_at = float(wiring.told_of(np.array(plant.counts()))[torn - 1])
+    torn_at = float(wiring.reported_counts(np.array(plant.counts()))[torn - 1])
     return replace(wiring, torn=torn, torn_at=torn_at)
 
 

@@ -14,8 +14,8 @@ import numpy as np
 from acquisition.errors import SettingsError
 from fakes.world.departure import (
     BusDefects,
+    ContainerError,
     ModuleDefects,
-    Place,
     RigDeviation,
     rotated_axes,
 )
@@ -116,9 +116,9 @@ _RIGS = (
     WrongRig("module-disobeys", "the safety module ignores a program that wants it idle", "firmware", RigDeviation(module=ModuleDefects(is_disobedient=True))),
     WrongRig("vl2-doubled", "the safety module sets twice the speed limit it is told", "firmware", RigDeviation(module=ModuleDefects(limits=(("VL2", 2.0),)))),
     WrongRig("heartbeat-1s", "the safety module waits a second for positions before it brakes", "firmware", RigDeviation(module=ModuleDefects(heartbeat=10.0))),
-    WrongRig("incline-off-5deg", "the container is inclined by 5 degrees more than typed", "typing", RigDeviation(place=Place(incline=float(np.radians(5.0))))),
-    WrongRig("far-end-off-100mm", "the far end is 100 mm lower than typed", "typing", RigDeviation(place=Place(far_end=(0.0, 0.0, -0.1)))),
-    WrongRig("travel-too-long", "the container is 100 mm shorter than typed", "typing", RigDeviation(place=Place(travel=-0.1))),
+    WrongRig("incline-off-5deg", "the container is inclined by 5 degrees more than typed", "typing", RigDeviation(place=ContainerError(incline=float(np.radians(5.0))))),
+    WrongRig("far-end-off-100mm", "the far end is 100 mm lower than typed", "typing", RigDeviation(place=ContainerError(far_end=(0.0, 0.0, -0.1)))),
+    WrongRig("travel-too-long", "the container is 100 mm shorter than typed", "typing", RigDeviation(place=ContainerError(travel=-0.1))),
 )
 # fmt: on
 

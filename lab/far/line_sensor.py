@@ -68,7 +68,7 @@ class LineSensor:
     def advance(self, frames: list[Frame], data: bytes) -> Turn:
         """Simulate the sensor up to now."""
         del frames
-        return TICK_NS, [], self._end.advance(self._clock.go_on(), data)
+        return TICK_NS, [], self._end.advance(self._clock.advance_to_now(), data)
 
     def do(self, line: str) -> None:
         """Raise KeyError: there are no commands."""

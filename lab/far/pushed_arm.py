@@ -89,7 +89,7 @@ class PushedArm:
 
     def advance(self, frames: list[Frame], data: bytes) -> Turn:
         """Simulate bus, arm and sensor up to now."""
-        now_ns, wired = self._clock.go_on(), self._wired
+        now_ns, wired = self._clock.advance_to_now(), self._wired
         for can_id, payload in frames:
             if can_id <= _HIGHEST_ID:
                 wired.send(now_ns, can_id, payload)

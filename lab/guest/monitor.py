@@ -31,12 +31,12 @@ class Monitor:
             self._ask("qmp_capabilities", {})
             _is_greeted.append(True)
 
-    def pull_out(self, device: dict[str, Any], node: Path) -> None:
+    def unplug(self, device: dict[str, Any], node: Path) -> None:
         """Unplug a device and wait until `node` has disappeared."""
         self._ask("device_del", {"id": device["id"]})
         self._await(node, is_there=False)
 
-    def put_in(self, device: dict[str, Any], node: Path) -> None:
+    def plug_in(self, device: dict[str, Any], node: Path) -> None:
         """Plug a device in again and wait until `node` exists."""
         end = seconds() + _PATIENCE
         # QEMU releases the old device a moment later than the kernel.

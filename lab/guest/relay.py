@@ -18,8 +18,8 @@ from acquisition.clock import NS_PER_S, SystemClock
 from experiments.operator.pendant import Lines
 from lab.calls import (
     DONE,
+    MAX_BYTES,
     MEMORY_SIZE,
-    MOST_BYTES,
     PCI_ID,
     REGISTERS_SIZE,
     Call,
@@ -87,7 +87,7 @@ class Line:
 
     def write(self, data: bytes) -> None:
         """Write bytes; those not accepted by the port wait for the next call."""
-        self._unsent = (self._unsent + data)[-MOST_BYTES:]
+        self._unsent = (self._unsent + data)[-MAX_BYTES:]
         if self._unsent:
             with contextlib.suppress(OSError):
                 self._unsent = self._unsent[os.write(self._port, self._unsent) :]

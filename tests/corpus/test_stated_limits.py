@@ -18,7 +18,7 @@ from acquisition.trial_file.data_files import open_data
 from acquisition.trial_file.reader import MAX_ROWS, TrialReader
 from acquisition.trial_file.salvage import SoundRecords
 from analysis.data.memory import share_of_memory
-from analysis.study.store import LARGEST, MOST_BYTES
+from analysis.study.store import LARGEST, MAX_STORE_BYTES
 from analysis.tables import loading as tables
 from analysis.tables.loading import LARGEST_FILE, PARTS, load_tables, most_trials
 from analysis.tables.text import LONGEST_LINE
@@ -64,7 +64,7 @@ def test_the_tested_limits_are_the_documented_ones():
     for row, stated in zip(rows[1:], STATED, strict=True):  # after the head
         assert row.strip().endswith(stated)
     assert (MAX_ROWS, MAX_EVENTS, RECORD_LIMIT) == (300_000, 50_000, 16 * MIB)
-    assert (LARGEST, MOST_BYTES) == (16 * MIB, 256 * MIB)
+    assert (LARGEST, MAX_STORE_BYTES) == (16 * MIB, 256 * MIB)
     assert (LARGEST_FILE, LONGEST_LINE, PARTS) == (24_000_000, 65_536, 8)
     free = share_of_memory(1, 0)
     assert most_trials() == pytest.approx(max(24_000_000, free / 8) / 12_000, rel=0.2)

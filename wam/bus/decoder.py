@@ -260,7 +260,7 @@ class BusReader:
     def _match_reply(self, key: _Key, utc_ns: int) -> str:
         request_times = self._open.get(key)
         if request_times is None:
-            self.tally.unasked += 1
+            self.tally.unsolicited += 1
             return ", UNASKED"
         delay_ns = utc_ns - request_times.pop(0)
         if not request_times:
@@ -292,7 +292,7 @@ class BusReader:
         what = f"{node_name(node)}: {name}"
         request_times = self._open.pop(key, [])
         if request_times:
-            self.tally.silent[what] += len(request_times)
+            self.tally.unanswered[what] += len(request_times)
         return [DecodedLine(t, f"UNANSWERED {what}") for t in request_times]
 
 

@@ -70,12 +70,12 @@ class BusSummary:
         answers: replies to a request.
         late: replies after more than 1 ms.
         slowest_ns: longest reply time.
-        unasked: replies without a request.
+        unsolicited: replies without a request.
         jumps: steps back of the log's clock by more than 1 s.
         gaps: intervals of more than 1 s without a frame.
         longest_gap_ns: longest of them.
         errors: errors reported by the CAN controller, by name.
-        silent: requests without a reply, by device and property.
+        unanswered: requests without a reply, by device and property.
     """
 
     frames: int = 0
@@ -84,12 +84,12 @@ class BusSummary:
     answers: int = 0
     late: int = 0
     slowest_ns: int = 0
-    unasked: int = 0
+    unsolicited: int = 0
     jumps: int = 0
     gaps: int = 0
     longest_gap_ns: int = 0
     errors: Counter[str] = field(default_factory=Counter[str])
-    silent: Counter[str] = field(default_factory=Counter[str])
+    unanswered: Counter[str] = field(default_factory=Counter[str])
 
 
 _OVERHEAD, _STUFFABLE = 47, 34  # bits of a frame without data

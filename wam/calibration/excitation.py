@@ -45,11 +45,11 @@ class FrictionLeg:
     """One leg of the path.
 
     Attributes:
-        halt: goal and speed.
+        waypoint: goal and speed.
         use: purpose of its recording.
     """
 
-    halt: MeasurementPose
+    waypoint: MeasurementPose
     use: LegPurpose
 
 
@@ -84,8 +84,8 @@ def plan_friction(model: ArmModel, start: Array, space: FreeSpace) -> list[Frict
         is_transit = use is LegPurpose.TRANSIT
         pose += was_transit and not is_transit
         top_speed = min(speed, leg_speed(model, position, goal))
-        halt = MeasurementPose(goal, top_speed, None if is_transit else pose)
-        legs.append(FrictionLeg(halt, use))
+        waypoint = MeasurementPose(goal, top_speed, None if is_transit else pose)
+        legs.append(FrictionLeg(waypoint, use))
         position = goal
     return legs
 

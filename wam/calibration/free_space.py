@@ -30,7 +30,7 @@ class FreeSpace:
     floor: float
     clearance: ArmClearance | None = None
 
-    def holds(self, q: Array) -> bool:
+    def is_free(self, q: Array) -> bool:
         """Return whether the pose `q` [rad], shape (7,), is free of collision."""
         return (
             self.clearance is None
@@ -111,7 +111,7 @@ def check_rise(model: ArmModel, start: Array, space: FreeSpace) -> None:
         )
 
 
-def lowest(model: ArmModel, q: NDArray[np.float64]) -> Array:
+def lowest_height(model: ArmModel, q: NDArray[np.float64]) -> Array:
     """Return the height of the lowest of sole, plate and elbow [m].
 
     Args:
@@ -132,7 +132,7 @@ def is_clear(model: ArmModel, start: Array, goal: Array, floor: float) -> bool:
     An end below `floor`, such as the foot in its container, is allowed if no point of
     the path is lower than the lower end.
     """
-    heights = lowest(model, straight_path(start, goal, STEP))
+    heights = lowest_height(model, straight_path(start, goal, STEP))
     return bool(heights.min() >= min(floor, heights[0], heights[-1]) - _SLACK)
 
 

@@ -13,7 +13,7 @@ from wam.calibration.free_space import (
     FreeSpace,
     check_rise,
     elbow_position,
-    lowest,
+    lowest_height,
 )
 from wam.control.position_control import TOP_SPEED, JointMove
 from wam.model.arm_model import ArmModel
@@ -94,7 +94,7 @@ def tilted_pair(model: ArmModel, space: FreeSpace) -> list[Array]:
     for joint, angle in _TILTS:
         tilted = upright.copy()
         tilted[joint] += angle
-        if space.holds(tilted) and space.is_clear(model, upright, tilted):
+        if space.is_free(tilted) and space.is_clear(model, upright, tilted):
             return [upright, tilted]
     raise SettingsError(
         "No wrist pose is free of collision.",
@@ -196,11 +196,11 @@ def _candidates(model: ArmModel, space: FreeSpace, count: int) -> list[Array]:
     drawn = np.array(UPRIGHT) + REACH * rng.uniform(-1.0, 1.0, (_CANDIDATES, 7))
     drawn = np.clip(drawn, constants.q_lower + margin, constants.q_upper - margin)
     sides = (-OFFSET, 0.0, OFFSET)
-    heights = np.min([lowest(model, drawn + side) for side in sides], axis=0)
+    heights = np.min([lowest_height(model, drawn + side) for side in sides], axis=0)
     reachable = [
         q
         for q in drawn[heights > space.floor]
-        if all(space.holds(q + side) for side in sides)
+        if all(space.is_free(q + side) for side in sides)
     ]
     if len(reachable) < count:
         raise SettingsError(

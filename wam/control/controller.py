@@ -97,7 +97,7 @@ class FootController(ControlLaw):
         else:
             self._hold.begin(reading.q, self._move_spring(reading))
         if self._friction is not None and state is not ArmState.FLOAT:
-            self._friction.rest(now)
+            self._friction.stop(now)
         self._mode = state
         self._mass.aim(self._target_mass if state is ArmState.FLOAT else 0.0, now)
         if state in _POWERED:
@@ -261,7 +261,7 @@ class FootController(ControlLaw):
         if self._mode is ArmState.FLOAT:
             depth = None if self._walls is None else self._walls.depth(reading.q)
             tau[:LOCKED_JOINT] += friction.torque(reading, tau, depth)[:LOCKED_JOINT]
-        elif (fading := friction.resting(reading.host_ns)) is not None:
+        elif (fading := friction.fading_torque(reading.host_ns)) is not None:
             tau[:LOCKED_JOINT] += fading[:LOCKED_JOINT]
             np.clip(tau, -self._largest, self._largest, out=tau)
 

@@ -26,7 +26,7 @@ from wam.model.friction import (
 )
 
 LARGEST_SHARE = 0.8
-SWUNG_MOTOR = "friction:swung_motor"  # metadata key of the recording
+OSCILLATING_MOTOR = "friction:swung_motor"  # metadata key of the recording
 _MARGIN = 0.9  # of the true friction: upper bound of share (1 + error)
 _SIGMAS = 1.96
 # Four times the assumed presliding of the drives: a stiffer bristle would limit-cycle.
@@ -83,7 +83,7 @@ class FrictionCompensation:
     """Friction compensation of the seven motors, in float only.
 
     Attributes:
-        swung_motor: first motor that oscillated faster than a hand can, 1-7; 0 = none.
+        oscillating_motor: first motor oscillating faster than a hand, 1-7; 0 = none.
             Its friction is below the calibrated one, so compensation has ended.
     """
 
@@ -106,7 +106,7 @@ class FrictionCompensation:
         )
         levels = shares * known.forward, shares * known.backward
         rows = np.stack((1.0 / reach, *levels, shares * known.load, known.load_at))
-        self.swung_motor = 0
+        self.oscillating_motor = 0
         self._j2mp = np.array(constants.j2mp)
         self._to_joints = np.ascontiguousarray(self._j2mp.T)
         self._of_torques = np.linalg.inv(self._to_joints)
@@ -118,16 +118,16 @@ class FrictionCompensation:
 
     def metadata(self) -> dict[str, str]:
         """Return the oscillating motor as metadata of the recording, "0" = none."""
-        return {SWUNG_MOTOR: str(self.swung_motor)}
+        return {OSCILLATING_MOTOR: str(self.oscillating_motor)}
 
-    def rest(self, now_ns: int) -> None:
+    def stop(self, now_ns: int) -> None:
         """Stop compensating; the torque fades within 0.1 s."""
         if self._counts:
             self._fading = self._bristle_torque()
             self._rested_ns = now_ns
             self._begin([])
 
-    def resting(self, now_ns: int) -> Array | None:
+    def fading_torque(self, now_ns: int) -> Array | None:
         """Return the fading torques after `rest` [N m], (7,); None = all 0."""
         share = 1.0 - (now_ns - self._rested_ns) / _FADE_NS
         return self._fading * share if share > 0.0 else None
@@ -143,12 +143,12 @@ class FrictionCompensation:
             depth: depth of each joint in its soft wall [rad], shape (7,); None = all 0.
         """
         now = reading.host_ns
-        if self.swung_motor == 0:
+        if self.oscillating_motor == 0:
             self._follow(reading.counts)
             self._watch(now)
-        if self.swung_motor:
-            self.rest(now)
-            fading = self.resting(now)
+        if self.oscillating_motor:
+            self.stop(now)
+            fading = self.fading_torque(now)
             return np.zeros(7) if fading is None else fading
         self._load_torques = self._of_torques.dot(load_torque).tolist()
         return self._bristle_torque(depth)
@@ -183,7 +183,7 @@ class FrictionCompensation:
             changes = [*self._sign_changes_ns[motor], now_ns][-_SWINGS:]
             self._sign_changes_ns[motor] = changes
             if len(changes) == _SWINGS and now_ns - changes[0] < _SWING_NS:
-                self.swung_motor = motor + 1
+                self.oscillating_motor = motor + 1
                 return
 
     def _bristle_torque(self, depth: Array | None = None) -> Array:

@@ -45,7 +45,7 @@ class PoweredTest:
         self.goal = goal
         self._constants = constants
         self._limits = limits
-        self._travel_limits = limits.ways(goal)
+        self._travel_limits = limits.travel_limits(goal)
         self._q: list[float] = []
         self._begun_ns = 0
         self._has_moved = False

@@ -32,7 +32,7 @@ class PuckHealth:
     error: int | None = None
     heard_ns: int | None = None
 
-    def is_news(self, now_ns: int) -> bool:
+    def is_recent(self, now_ns: int) -> bool:
         """Return whether the last report is recent."""
         return self.heard_ns is not None and now_ns - self.heard_ns <= STALE_NS
 
@@ -121,7 +121,7 @@ def temperature_range(pucks: Sequence[PuckHealth], now_ns: int) -> str:
         degc
         for puck in pucks
         for degc in (puck.puck_degc, puck.motor_degc)
-        if degc is not None and puck.is_news(now_ns)
+        if degc is not None and puck.is_recent(now_ns)
     ]
     range_text = (
         f"{min(temperatures)}-{max(temperatures)} °C"
@@ -131,7 +131,7 @@ def temperature_range(pucks: Sequence[PuckHealth], now_ns: int) -> str:
     silent = [
         f"puck {node} silent for {(now_ns - puck.heard_ns) / NS_PER_S:.0f} s"
         for node, puck in enumerate(pucks, 1)
-        if puck.heard_ns is not None and not puck.is_news(now_ns)
+        if puck.heard_ns is not None and not puck.is_recent(now_ns)
     ]
     return ", ".join([range_text, *silent])
 
@@ -140,7 +140,7 @@ def health_warnings(pucks: Sequence[PuckHealth], now_ns: int) -> list[str]:
     """Return warnings of pucks 1 to 7, such as "puck 3 at 72 °C (limit 60)"."""
     texts: list[str] = []
     for node, puck in enumerate(pucks, 1):
-        if not puck.is_news(now_ns):
+        if not puck.is_recent(now_ns):
             continue
         if puck.puck_degc is not None and puck.puck_degc > HOT:
             texts.append(f"puck {node} at {puck.puck_degc} °C (limit {HOT})")
@@ -158,7 +158,7 @@ def health_metadata(pucks: Sequence[PuckHealth], now_ns: int) -> dict[str, str]:
         "?" if p.heard_ns is None else f"{(now_ns - p.heard_ns) / NS_PER_S:.1f}"
         for p in pucks
     ]
-    pucks = [p if p.is_news(now_ns) else PuckHealth() for p in pucks]
+    pucks = [p if p.is_recent(now_ns) else PuckHealth() for p in pucks]
 
     def row(values: Sequence[int | None]) -> str:
         return " ".join("?" if value is None else str(value) for value in values)

@@ -55,7 +55,7 @@ class PendantState:
         )
 
     @property
-    def unclear(self) -> tuple[str, ...]:
+    def inconsistent_monitors(self) -> tuple[str, ...]:
         """Names of the monitors in no state or several."""
         return tuple(
             name for name in MONITORS if getattr(self, name) is SafetyLevel.UNKNOWN

@@ -234,11 +234,12 @@ class SafetyModule:
             return NO_PENDANT, "The safety module does not answer GET PEN."
         word &= 0xFFFFFFFF
         pendant = decode_pendant(word, MONITORS)
-        if not pendant.unclear:
+        if not pendant.inconsistent_monitors:
             return pendant, ""
         return pendant, (
             f"The pendant's word {word:08X} shows none or several states of: "
-            f"{', '.join(pendant.unclear)}. Their faults would not be noticed."
+            f"{', '.join(pendant.inconsistent_monitors)}. "
+            "Their faults would not be noticed."
         )
 
     def _get(self, name: str) -> int:

@@ -190,7 +190,7 @@ class StatusPoller:
         self.is_lowering = False
         self.contradicted_by.clear()
         self.disobeys = None
-        self.excused = pendant.unclear
+        self.excused = pendant.inconsistent_monitors
         self.note_pendant(pendant)
 
     def note_pendant(self, pendant: PendantState) -> None:

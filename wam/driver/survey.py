@@ -33,7 +33,7 @@ class RestTraffic:
 
 
 @dataclass(frozen=True, slots=True)
-class Answers:
+class ReplyCounts:
     """Number of replies of each device to one request.
 
     Attributes:
@@ -68,13 +68,13 @@ class BusSurvey:
             frames += len(link.receive())
         return RestTraffic(frames, link.foreign_id, link.errors.frames)
 
-    def count_answers(self, times: int) -> Answers:
+    def count_answers(self, times: int) -> ReplyCounts:
         """Request STAT of every device of the arm `times` times; count the replies.
 
         Raises:
             LinkError: the bus is down.
         """
-        answers = Answers()
+        answers = ReplyCounts()
         for node in (*MOTOR_NODES, SAFETY_NODE):
             values = [self._replies_of(node) for _ in range(times)]
             answers.nodes.append(node)

@@ -28,7 +28,7 @@ _REACH_NOTE = (
 )
 
 
-def reach(results: StudyResults) -> ReportTable:
+def limits_table(results: StudyResults) -> ReportTable:
     """Return the table of measurement limits and model errors by terrain."""
     rows = []
     for name, result in results.study.terrains.items():
@@ -92,7 +92,7 @@ def _median(
 
 
 def _tables(results: StudyResults, _: ReportContext) -> list[ReportTable]:
-    return [reach(results)] if results.rig else []
+    return [limits_table(results)] if results.rig else []
 
 
 SECTION = Section(ReportSection.REACH, _tables)

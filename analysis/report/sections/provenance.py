@@ -11,7 +11,7 @@ from analysis.study.study import Study
 from analysis.tustin.model import SYMBOLS
 
 
-def choices(study: Study, *, is_foreign: bool) -> ReportTable:
+def settings_table(study: Study, *, is_foreign: bool) -> ReportTable:
     """Return the table of all settings of the analysis."""
     prepare, fit = study.options.prepare, study.options.fit
     box = ", ".join(
@@ -88,7 +88,7 @@ def _rates(study: Study) -> str:
 
 
 def _tables(results: StudyResults, context: ReportContext) -> list[ReportTable]:
-    return [choices(results.study, is_foreign=context.is_foreign)]
+    return [settings_table(results.study, is_foreign=context.is_foreign)]
 
 
 SECTION = Section(ReportSection.ORIGIN, _tables)

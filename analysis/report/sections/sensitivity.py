@@ -82,7 +82,7 @@ class StudyVariant:
             SettingsError: the choice needs a recording, but the trial is a table.
         """
         if isinstance(trial, RecordedTrial):
-            chosen = trial.interpolated() if self.is_interpolated else trial
+            chosen = trial.with_interpolated_tare() if self.is_interpolated else trial
             chosen = chosen.without_inertia() if self.is_inertia_removed else chosen
             series = chosen.series(self.frame)
         elif self.frame == "terrain" and not (

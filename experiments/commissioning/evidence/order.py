@@ -111,7 +111,7 @@ BASES: dict[str, Basis] = {
         _from(_S.BY_HAND, _S.GRAVITY_RAMP),
     ),
 }
-TOLD = ("mounting", "cables")  # bases that only a person can report
+REPORTED_BASES = ("mounting", "cables")  # bases that only a person can report
 LONGEST_DAYS = 30  # validity of a step
 
 

@@ -228,7 +228,7 @@ class Bench:
 
     @property
     def reasons(self):
-        return [verdict.reason for verdict in self.cycle.status.standing]
+        return [verdict.reason for verdict in self.cycle.status.active_verdicts]
 
     @property
     def reason(self):
@@ -737,7 +737,7 @@ def test_of_two_verdicts_the_stricter_comes_first_and_both_stand(bench, first, s
     for name in (first, second):
         bench.cycle.report(fault(name))
         bench.run()
-    faults = [verdict.fault for verdict in bench.cycle.status.standing]
+    faults = [verdict.fault for verdict in bench.cycle.status.active_verdicts]
     assert faults == [Fault.MOTOR_STUCK, Fault.CONSOLE_SILENT]
     assert (bench.state, bench.cycle.status.number) == (ArmState.IDLE, 2)
 

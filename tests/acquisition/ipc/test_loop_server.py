@@ -177,7 +177,7 @@ def test_a_silent_recorder_stops_a_trial_only(loop):
 
 def test_an_orphaned_arm_holds_at_once_and_idles_later(loop):
     loop.run(0.1)
-    loop.loop_server.orphan()
+    loop.loop_server.on_console_death()
     loop.run(0.002)
     assert loop.reasons() == {"console-lost"}
     loop.run(0.998)

@@ -53,7 +53,7 @@ def test_file_and_sidecar_give_both_tares(load):
 def test_a_sidecar_without_a_valid_tare_gives_no_bracket(load, sidecar):
     trial = load(sidecar)
     assert trial.bracket is None
-    assert trial.interpolated() is trial
+    assert trial.with_interpolated_tare() is trial
 
 
 def test_an_older_recording_without_the_time_of_its_tare_is_read(load):
@@ -69,7 +69,7 @@ def test_the_zero_is_interpolated_linearly_and_held_at_its_ends():
 
 def test_an_interpolated_trial_uses_the_zero_at_each_instant(load):
     trial = load(json.dumps({"next_tare": NEXT_TARE}))
-    other = trial.interpolated()
+    other = trial.with_interpolated_tare()
     passed = (2.0 + trial.t) / 10.0
     drift = passed[:, None] * (NEXT - STORED)[:3]
     expected = FORCE - trial.payload.to_base(trial.payload.sign * drift, trial.rotation)

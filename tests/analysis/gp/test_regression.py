@@ -117,7 +117,7 @@ def test_search_reaches_the_reference_optimum(vectors, kernel, case):
     assert found.lml == pytest.approx(best, abs=1e-4)
     theta = data[case].get("polished_theta", data[case].get("theta"))
     np.testing.assert_allclose(found.theta, theta, atol=1e-2)
-    assert len(found.starts) == len(found.began) > 1
+    assert len(found.starts) == len(found.start_points) > 1
     assert found.lml == max(start.lml for start in found.starts)
 
 

@@ -6,7 +6,7 @@ from analysis.gp.arcsine import Arcsine
 from analysis.gp.kernels import SquaredExponential
 from analysis.gp.noise import ConstantNoise, LogLinearNoise
 from analysis.gp.proposals import bounds, moves
-from analysis.gp.search import Search, climb_from, likeliest, posterior_search
+from analysis.gp.search import Search, climb_from, maximise_posterior, posterior_search
 
 SE = SquaredExponential(2)
 ROWS = np.random.default_rng(0).normal(size=(40, 2))
@@ -51,8 +51,8 @@ class Hills:
 def test_a_search_starts_at_the_best_point_on_a_subset():
     goal = np.log([0.1, 3.5] * ROWS.std(axis=0))
     rough = Hills((np.array([0.0, *goal, 0.0]), 5.0, 1.0))
-    optimum = likeliest(Hills((np.zeros(4), 5.0, 1.0), rough=rough))
-    np.testing.assert_allclose(optimum.began[0][1:3], goal)
+    optimum = maximise_posterior(Hills((np.zeros(4), 5.0, 1.0), rough=rough))
+    np.testing.assert_allclose(optimum.start_points[0][1:3], goal)
 
 
 def test_a_move_finds_an_optimum_that_the_first_start_misses():
@@ -60,10 +60,10 @@ def test_a_move_finds_an_optimum_that_the_first_start_misses():
     high = low + np.array([0.0, 0.0, 2.5, 0.0])  # one length apart
     # all that a part of the rows knows of is the lower top
     both = Hills((low, 5.0, 0.6), (high, 9.0, 0.6), rough=Hills((low, 5.0, 0.6)))
-    optimum = likeliest(both)
+    optimum = maximise_posterior(both)
     np.testing.assert_allclose(optimum.theta[1:3], high[1:3], atol=0.1)
     assert [start.lml > 8 for start in optimum.starts[:2]] == [False, True]
-    assert climb_from(both, optimum.began[:1]).lml < 6
+    assert climb_from(both, optimum.start_points[:1]).lml < 6
 
 
 @pytest.mark.parametrize("length", [0.5, 5.5])
@@ -73,8 +73,8 @@ def test_a_move_is_far_from_known_optima(length):
     search.move()
     optimum = search.optimum()
     # lengths beyond e^4 standard deviations are all the same
-    known = np.minimum([optimum.starts[0].theta, optimum.began[0]], 4.0)
-    for moved in optimum.began[1:]:
+    known = np.minimum([optimum.starts[0].theta, optimum.start_points[0]], 4.0)
+    for moved in optimum.start_points[1:]:
         gaps = np.abs(known - np.minimum(moved, 4.0))[:, 1:3]
         assert gaps.max(axis=1).min() >= 1.0
 
@@ -92,7 +92,9 @@ def test_a_neighbouring_optimum_is_found(apart):
 def test_no_neighbour_is_searched_along_an_inactive_length():
     top = np.array([0.0, 5.5, 5.5, -0.5])
     optimum = climb_from(Hills((top, 5.0, 3.0)), [top], is_searched=True)
-    gaps = np.abs(np.array(optimum.began[1:])[:, 1:3] - optimum.starts[0].theta[1:3])
+    gaps = np.abs(
+        np.array(optimum.start_points[1:])[:, 1:3] - optimum.starts[0].theta[1:3]
+    )
     assert gaps.max(axis=1).min() >= 1.0
 
 
@@ -107,13 +109,17 @@ def test_a_climb_near_a_known_optimum_is_abandoned():
 
 
 def test_points_without_a_likelihood_are_not_starts():
-    optimum = likeliest(Hills((np.zeros(4), 5.0, 1.0), hole=lambda x: x[1] < -1))
-    assert all(start[1] >= -1 for start in optimum.began)
+    optimum = maximise_posterior(
+        Hills((np.zeros(4), 5.0, 1.0), hole=lambda x: x[1] < -1)
+    )
+    assert all(start[1] >= -1 for start in optimum.start_points)
 
 
 def test_hyperparameters_at_the_edge_of_the_search_are_named():
     edge = bounds(SE, 1.0, ROWS.std(axis=0))[2, 1]
-    optimum = likeliest(Hills((np.array([0.0, 0.0, edge + 1.0, 0.0]), 9.0, 2.0)))
+    optimum = maximise_posterior(
+        Hills((np.array([0.0, 0.0, edge + 1.0, 0.0]), 9.0, 2.0))
+    )
     assert optimum.at_bound == ("log_l2",)
 
 
@@ -124,7 +130,7 @@ def test_every_kernel_is_searched_from_one_start_and_its_moves(name, noise, rows
     X, kernel = ROWS[:rows], KERNELS[name]
     y = np.sin(X[:, 0]) + np.random.default_rng(1).normal(0, 0.1, rows)
     optimum = posterior_search(kernel, noise, X, y)
-    assert len(optimum.starts) == len(optimum.began)
+    assert len(optimum.starts) == len(optimum.start_points)
     theta = optimum.theta[: len(kernel.names)]
     assert 1 <= len(optimum.starts) <= 2 + len(moves(kernel, theta))
     assert optimum.lml == max(start.lml for start in optimum.starts)
@@ -153,7 +159,9 @@ def test_an_input_with_a_long_length_is_tried_as_inactive():
     low = np.array([0.0, -1.0, 1.5, -0.5])
     bound = bounds(SE, 1.0, ROWS.std(axis=0))[2, 1]
     high = np.array([0.0, -1.0, bound, -0.5])
-    optimum = likeliest(Hills((low, 9.0, 0.8), (high, 9.5, 0.8), (high, 1.0, 3.0)))
+    optimum = maximise_posterior(
+        Hills((low, 9.0, 0.8), (high, 9.5, 0.8), (high, 1.0, 3.0))
+    )
     np.testing.assert_allclose(optimum.theta[2], bound, atol=0.2)
 
 

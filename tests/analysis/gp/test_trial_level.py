@@ -32,7 +32,7 @@ def test_the_spread_of_many_trials_is_estimated_by_moments():
     assert levels.is_by_moments
     assert levels.between == pytest.approx(0.6, rel=0.2)
     assert levels.other == pytest.approx(0.6, rel=0.2)
-    assert not levels.do_differ
+    assert not levels.estimates_differ
     assert levels.components.tau == pytest.approx(0.5, rel=0.15)
     assert levels.components.within == pytest.approx(2.5, rel=0.05)
 

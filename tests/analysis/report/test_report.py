@@ -19,7 +19,7 @@ from analysis.report.sections.paper.excerpts import busiest_window, draw_excerpt
 from analysis.report.sections.paper.surfaces import near_samples
 from analysis.report.sections.paper.table_one import table_one
 from analysis.report.sections.paper.tustin_model import draw_tustin_model
-from analysis.report.sections.provenance import choices
+from analysis.report.sections.provenance import settings_table
 from analysis.report.sections.summary.section import summary, verdicts
 from analysis.report.style import render, styled
 from analysis.report.velocity_panels import panels
@@ -340,7 +340,7 @@ def test_a_useful_model_is_labelled_so(small_study):
 
 
 def test_choices_state_smoothing_in_time_and_in_samples(small_study):
-    rows = dict(choices(small_study, is_foreign=True).rows)
+    rows = dict(settings_table(small_study, is_foreign=True).rows)
     assert "22 ms" in rows["smoothing"]
     assert "11 samples" in rows["smoothing"]
     assert "10 ms" in rows["downsampling"]

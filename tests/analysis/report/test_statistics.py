@@ -9,7 +9,9 @@ import pytest
 from analysis.report.cell_texts import interval_text, paired_cells
 from analysis.report.results import compute_results
 from analysis.report.sections.beyond_paper.paired_comparisons import paired_table
-from analysis.report.sections.beyond_paper.predicted_uncertainty import uncertainty
+from analysis.report.sections.beyond_paper.predicted_uncertainty import (
+    uncertainty_table,
+)
 from analysis.report.sections.beyond_paper.residuals import (
     independent_samples,
     residual_bands,
@@ -45,7 +47,7 @@ def test_the_note_states_the_number_of_comparisons(small_study):
 
 def test_coverage_carries_its_standard_error_over_the_trials(small_study):
     shares = small_study.terrains["S0"].scores(GP_SE, "coverage95")
-    table = uncertainty(small_study)
+    table = uncertainty_table(small_study)
     row = next(r for r in table.rows if tuple(r[:2]) == ("S0", TITLES[GP_SE]))
     text = row[list(table.header).index("95%")]
     assert text == f"{np.mean(shares):.1%} ± {standard_error(shares):.1%}"

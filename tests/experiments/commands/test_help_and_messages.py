@@ -254,7 +254,7 @@ def _deaf(scene):
 
 
 def _orphan(scene):
-    scene.built.loop_servers[-1].orphan()
+    scene.built.loop_servers[-1].on_console_death()
 
 
 def _ask_an_idle_arm(scene):

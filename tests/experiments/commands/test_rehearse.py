@@ -13,7 +13,7 @@ from acquisition.trial_file.reader import TrialReader
 from experiments.arguments import FRICTION
 from experiments.rehearsal import recording
 from experiments.rehearsal.bands import Band, BandResult
-from experiments.rehearsal.judging import gated
+from experiments.rehearsal.judging import deciding_bands
 from experiments.rehearsal.plan import AcceptancePlan
 from experiments.session.store import list_sessions
 from experiments.settings.load import load_settings
@@ -179,7 +179,7 @@ def test_bands_on_backward_slips_decide_at_low_friction_only(change, deciding):
     results = [
         BandResult(Band(name, "what", 0, 1), (2.0,)) for name in ("D4", "D5", "E3")
     ]
-    shown = gated(dataclasses.replace(PLAN, **change), results)
+    shown = deciding_bands(dataclasses.replace(PLAN, **change), results)
     assert {result.band.id for result in shown} == deciding
 
 

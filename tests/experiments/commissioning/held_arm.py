@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from experiments.commissioning.by_hand import CARRY_SECONDS
+from experiments.commissioning.manual_joints import CARRY_SECONDS
 from experiments.commissioning.recording import Values
 from experiments.commissioning.scales import PRESSED, PULLED
 from experiments.commissioning.weights import AVERAGE, HUNG, HUNG_AT, POSES, SETTLED

@@ -6,8 +6,8 @@ from acquisition.devices import SafetyMode
 from acquisition.errors import SettingsError
 from experiments.commissioning import (
     bus,
-    by_hand,
     configuration,
+    manual_joints,
     rest_pose,
     stop_circuit,
 )
@@ -55,7 +55,7 @@ def turned(joint=0, off=0.0, scale=1.0):
 
 
 def test_joints_that_stop_at_their_limits_pass():
-    assert by_hand.judge(turned()).cause == ""
+    assert manual_joints.judge(turned()).cause == ""
 
 
 @pytest.mark.parametrize(
@@ -67,13 +67,13 @@ def test_joints_that_stop_at_their_limits_pass():
     ],
 )
 def test_a_wrong_encoder_is_named(values, words):
-    assert words in by_hand.judge(values).cause
+    assert words in manual_joints.judge(values).cause
 
 
 def test_a_joint_that_moves_along_is_named():
     values = turned()
     values["high"][4, 5] = 1.0
-    assert "Turned was joint 5, joint 6 went along" in by_hand.judge(values).cause
+    assert "Turned was joint 5, joint 6 went along" in manual_joints.judge(values).cause
 
 
 def pressed(*, silent_after=0):

@@ -7,7 +7,13 @@ import pytest
 
 from acquisition.errors import PreflightError, SettingsError
 from experiments.commissioning.evidence.gate import bases_of, lacks, require
-from experiments.commissioning.evidence.order import BASES, GATED, ORDER, TOLD, StepId
+from experiments.commissioning.evidence.order import (
+    BASES,
+    GATED,
+    ORDER,
+    REPORTED_BASES,
+    StepId,
+)
 from experiments.commissioning.evidence.record import (
     NAME,
     Commissioning,
@@ -143,7 +149,7 @@ def test_an_unknown_input_makes_no_step_stale():
     assert lacks(whole(), present, NOON) == []
 
 
-@pytest.mark.parametrize("name", TOLD)
+@pytest.mark.parametrize("name", REPORTED_BASES)
 def test_a_reported_change_makes_its_steps_stale_until_they_are_repeated(name):
     record = whole().with_reported_change(name, NOON + timedelta(hours=1))
     lacking = lacks(record, INPUTS, NOON + timedelta(hours=2))

@@ -10,7 +10,7 @@ import pytest
 
 from experiments.commissioning.evidence.gate import lacks
 from experiments.commissioning.evidence.inputs import present_inputs
-from experiments.commissioning.evidence.order import BASES, ORDER, TOLD
+from experiments.commissioning.evidence.order import BASES, ORDER, REPORTED_BASES
 from experiments.preflight.connecting import connect_rig
 from experiments.rig.requests import LastAnswers, OpenSensor, StartArm
 from experiments.rig.rig import FakeOptions
@@ -151,7 +151,9 @@ def test_a_sensor_of_unknown_identity_makes_no_step_stale(sound):
 
 def test_every_basis_is_changed_by_a_test():
     # Changes reported by persons: tests/experiments/commissioning/test_record.py.
-    assert {*SETTINGS, *TOLD, "pucks", "motors", "module", "sensor"} == set(BASES)
+    assert {*SETTINGS, *REPORTED_BASES, "pucks", "motors", "module", "sensor"} == set(
+        BASES
+    )
 
 
 def test_a_container_measured_again_makes_its_steps_stale(sound):

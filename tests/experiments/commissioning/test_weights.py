@@ -2,7 +2,7 @@
 
 import pytest
 
-from experiments.commissioning import by_hand, weights
+from experiments.commissioning import manual_joints, weights
 from experiments.rig.build import build_tool
 from experiments.settings.load import load_settings
 from tests.experiments.commissioning.held_arm import HeldArm
@@ -33,9 +33,9 @@ def causes(tool, seed, wrong=""):
     """Causes found by the three steps in turn, "" for a sound one."""
     arm = HeldArm(tool, seed, wrong)
     stops = arm.stops()
-    yield by_hand.judge(stops).cause
+    yield manual_joints.judge(stops).cause
     yield weights.judge_own_weight(arm.own_weight()).cause
-    off = by_hand.stop_errors(stops)
+    off = manual_joints.stop_errors(stops)
     yield weights.judge_hung_weight(arm.hung_weight(off)).cause
 
 

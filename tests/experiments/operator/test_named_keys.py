@@ -17,13 +17,13 @@ NAMED = re.compile(r"\[(space|[a-z]|r?[1-9])\](?![\w.]*\()")
 CODE = Path(experiments.__file__).parent
 # Where texts of a module appear; several for a screen with a key for each.
 SHOWN_AT = {
-    "calibration/place.py": {Prompt.TOUCH},
+    "calibration/taught_place.py": {Prompt.TOUCH},
     "calibration/terrain.py": {Prompt.TOUCH},
     "calibration/touching.py": {Prompt.TOUCH},
     "commands/commission.py": {Prompt.CONFIRM},
     "operator/keys.py": set(KEYS),
     "operator/screens.py": {Prompt.READY},
-    "commissioning/by_hand.py": {Prompt.CONFIRM},
+    "commissioning/manual_joints.py": {Prompt.CONFIRM},
     "commissioning/daily.py": {Prompt.CONFIRM},
     "commissioning/guide.py": {Prompt.CONFIRM},
     "commissioning/lock_clock.py": {Prompt.CONFIRM, Prompt.PAUSED},

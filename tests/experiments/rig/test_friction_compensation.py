@@ -18,7 +18,7 @@ from fakes.plant.friction import draw_friction
 from tests.experiments.program import only_session, run_short, write_config
 from wam.calibration.friction_file import FrictionCalibration, friction_to_toml
 from wam.calibration.friction_fit import FrictionFit
-from wam.control.friction_compensation import SWUNG_MOTOR, FrictionCompensation
+from wam.control.friction_compensation import OSCILLATING_MOTOR, FrictionCompensation
 from wam.model.constants import load_constants
 from wam.model.friction import MotorFriction
 
@@ -136,7 +136,7 @@ def test_a_trial_records_calibration_and_share(folder):
 def test_the_review_names_a_motor_that_ended_the_compensation(
     folder, monkeypatch, motor
 ):
-    ended = {SWUNG_MOTOR: str(motor)}
+    ended = {OSCILLATING_MOTOR: str(motor)}
     monkeypatch.setattr(FrictionCompensation, "metadata", lambda self: ended)
     done = run_short(folder / "rig.toml", folder, "TF", 1, "--friction", "0.4")
     assert done.code == 0, done.err

@@ -171,7 +171,7 @@ def test_every_trial_has_the_tares_before_and_after_it(recorded):
 
 def test_the_interpolated_zero_approaches_the_second_tare(recorded):
     trial = load_trial(recorded.folder / "trials" / "T01.mcap")
-    moved = trial.interpolated().force - trial.force
+    moved = trial.with_interpolated_tare().force - trial.force
     assert np.linalg.norm(moved[-1]) > np.linalg.norm(moved[0]) > 0.0
 
 

@@ -152,10 +152,10 @@ def lose_derived_files(folder: SessionFolder):
     judged = [attempt for attempt in state.attempts if attempt.verdicts]
     kept = [attempt for attempt in judged if not attempt.is_rejected]
     for attempt in kept:
-        move(folder, attempt.place, f"rejected/{attempt.name.rejected}")
+        move(folder, attempt.relative_stem, f"rejected/{attempt.name.rejected}")
     rejected = {a.name.number: a for a in judged if a.is_rejected}  # one of each trial
     for attempt in rejected.values():
-        move(folder, attempt.place, f"trials/{attempt.name.kept}")
+        move(folder, attempt.relative_stem, f"trials/{attempt.name.kept}")
 
 
 def move(folder, place, other):
@@ -233,7 +233,7 @@ def test_readers_follow_the_journal_and_write_nothing(folder):
     for path in [*folder.trials.glob("*.json"), *folder.rejected.glob("*.json")]:
         path.unlink()
     for kept in state.kept_trials:
-        move(folder, kept.place, f"rejected/{kept.name.rejected}")
+        move(folder, kept.relative_stem, f"rejected/{kept.name.rejected}")
     before = {p: p.stat().st_ino for p in folder.path.rglob("*")}
     assert [sha256_of(path) for path in folder.kept_trials()] == sums
     assert [sidecar_of(folder, attempt) for attempt in state.attempts] == wanted

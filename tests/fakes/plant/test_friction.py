@@ -38,7 +38,7 @@ class Motors:
     def step(self, tau):
         bristles, speeds = self.bristles, self.speed.tolist()
         if np.abs(self.speed).max() > 0.05:  # rad/s of a motor: the ripple changes
-            bristles.bear(self.angle.tolist(), [0.0] * 7)
+            bristles.update_load(self.angle.tolist(), [0.0] * 7)
         bristles.take(speeds)
         damping = INERTIA + self.dt * np.array(bristles.damping)
         faster = self.dt * (tau + np.array(bristles.torques(speeds))) / damping

@@ -20,7 +20,7 @@ def test_wiring_as_built_changes_nothing():
     wiring = Wiring()
     assert wiring.applied_torques(UNITS) == UNITS
     counts = np.arange(7.0)
-    assert wiring.told_of(counts) == pytest.approx(counts)
+    assert wiring.reported_counts(counts) == pytest.approx(counts)
 
 
 def test_reversed_and_swapped_wiring_permute_the_motors():
@@ -33,14 +33,14 @@ def test_reversed_and_swapped_wiring_permute_the_motors():
 def test_swapped_encoders_report_the_other_motor_relative_to_home():
     home = np.full(7, 1000.0)
     wiring = Wiring(counts=swapped(4, 5), home=home)
-    told = wiring.told_of(home + np.array([0, 0, 0, 0, 10, 20, 0]))
+    told = wiring.reported_counts(home + np.array([0, 0, 0, 0, 10, 20, 0]))
     assert told[4:6].tolist() == [1020.0, 1010.0]
 
 
 def test_a_torn_cable_stops_the_rotor_and_removes_joint_torque():
     wiring = Wiring(torn=2, torn_at=777.0)
     assert wiring.applied_torques(UNITS)[1] == 0
-    assert wiring.told_of(np.zeros(7))[1] == 777.0
+    assert wiring.reported_counts(np.zeros(7))[1] == 777.0
 
 
 def test_the_arm_moves_by_the_torque_of_its_motors():

@@ -40,7 +40,7 @@ def settled(motors, known, share=0.8, *, late=0, joint=1, grip="none", cables=No
     bench.run(4.9)
     q = bench.run(1.0)
     assert bench.cycle.status.verdict is None
-    assert compensation.swung_motor == 0
+    assert compensation.oscillating_motor == 0
     return q
 
 

@@ -41,7 +41,7 @@ def late_arm(state, friction, late_ms, twist=0.0, seconds=1.0):
         worst = max(worst, float((np.abs(bench.plant.qd) / SPEED).max()))
         if idle_ms is None and bench.cycle.status.state is ArmState.IDLE:
             idle_ms = (bench.clock.now_ns() - begin_ns) / MS
-    faults = [verdict.fault for verdict in bench.cycle.status.standing]
+    faults = [verdict.fault for verdict in bench.cycle.status.active_verdicts]
     return worst, faults, idle_ms
 
 

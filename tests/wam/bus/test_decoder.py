@@ -90,7 +90,7 @@ def test_an_unsolicited_reply_is_reported(log):
     log(MS, "001 05")
     log(MS + 100 * US, "426 85 00 02 00")
     assert log(MS + 110 * US, "426 85 00 02 00").endswith(", UNASKED")
-    assert log.reader.tally.unasked == 2
+    assert log.reader.tally.unsolicited == 2
 
 
 def test_a_puck_that_misses_one_round_is_named(log):
@@ -99,7 +99,7 @@ def test_a_puck_that_misses_one_round_is_named(log):
         for node in (1, 2, 3, 4, 6, 7) if cycle == 0 else range(1, 8):
             log(cycle * 2 * MS + 300 * US, f"{0x403 + 0x20 * node:x} 00 00 00")
     assert log.said.count("UNANSWERED puck 5: position") == 1
-    assert log.reader.tally.silent == {"puck 5: position": 1}
+    assert log.reader.tally.unanswered == {"puck 5: position": 1}
     assert log.reader.tally.late == 0
     assert log.reader.finish() == []
 
@@ -125,7 +125,7 @@ def test_a_request_at_the_very_end_of_a_log_is_not_counted(log):
     log(6 * MS, "00F 05")
     assert log.reader.finish() == []
     tally = log.reader.tally
-    assert (tally.questions, tally.answers, not tally.silent) == (1, 1, True)
+    assert (tally.questions, tally.answers, not tally.unanswered) == (1, 1, True)
 
 
 def test_two_concurrent_requests_each_have_their_reply(log):
@@ -133,7 +133,7 @@ def test_two_concurrent_requests_each_have_their_reply(log):
     log(10 * US, "001 05")
     assert "100 us" in log(100 * US, "426 85 00 02 00")
     assert "190 us" in log(200 * US, "426 85 00 02 00")
-    assert log.reader.tally.silent == {}
+    assert log.reader.tally.unanswered == {}
 
 
 def test_property_names_follow_the_reported_firmware(log):
@@ -176,7 +176,7 @@ def test_a_clock_jump_is_reported_and_no_reply_matched_across_it(log):
     assert "TIME GOES BACK by 4.000 s" in log.said
     tally = log.reader.tally
     assert (tally.jumps, tally.questions, tally.answers) == (1, 0, 0)
-    assert (tally.unasked, tally.silent.total()) == (1, 0)
+    assert (tally.unsolicited, tally.unanswered.total()) == (1, 0)
 
 
 def test_a_gap_is_reported_and_leaves_its_request_unanswered(log):

@@ -185,21 +185,21 @@ def test_a_motor_that_slid_in_one_direction_only_is_named():
 def test_the_path_stays_within_its_time_budget(legs):
     here, seconds = IN_CONTAINER, 0.0
     for leg in legs:
-        move = JointMove(here, leg.halt.q, leg.halt.speed)
+        move = JointMove(here, leg.waypoint.q, leg.waypoint.speed)
         seconds += move.duration + 0.54  # the arm settles after each move
-        here = leg.halt.q
+        here = leg.waypoint.q
     assert 120.0 < seconds < 360.0
 
 
 def test_the_path_returns_to_its_start_and_rises_first(legs):
-    assert (legs[-1].halt.q == IN_CONTAINER).all()
-    assert (legs[0].halt.q == UPRIGHT).all()
+    assert (legs[-1].waypoint.q == IN_CONTAINER).all()
+    assert (legs[0].waypoint.q == UPRIGHT).all()
 
 
 def test_no_leg_is_too_fast_or_too_low(model, legs):
-    ends = [IN_CONTAINER, *(leg.halt.q for leg in legs)]
+    ends = [IN_CONTAINER, *(leg.waypoint.q for leg in legs)]
     for (here, goal), leg in zip(pairwise(ends), legs, strict=True):
-        move = JointMove(here, goal, leg.halt.speed)
+        move = JointMove(here, goal, leg.waypoint.speed)
         steps = [move.at(t)[0] for t in np.arange(0.0, move.duration, 0.1)]
         sole = model.sole_path(np.array([*steps, goal])).position
         speed = np.linalg.norm(np.diff(sole, axis=0), axis=1) / 0.1
@@ -214,8 +214,10 @@ def test_every_motor_turns_in_both_directions_slowly_and_fast(legs):
     for before, leg in pairwise(legs):
         if leg.use is LegPurpose.TRANSIT:
             continue
-        way = CONSTANTS.j2mp @ (leg.halt.q - before.halt.q) / TURNS
-        rate = leg.halt.speed * way / np.abs(leg.halt.q - before.halt.q).max()
+        way = CONSTANTS.j2mp @ (leg.waypoint.q - before.waypoint.q) / TURNS
+        rate = (
+            leg.waypoint.speed * way / np.abs(leg.waypoint.q - before.waypoint.q).max()
+        )
         for motor in np.flatnonzero(np.abs(rate) > 1e-9):
             turned.setdefault(int(motor), []).append(float(rate[motor]))
     for motor in range(7):
@@ -228,7 +230,7 @@ def test_every_motor_turns_in_both_directions_slowly_and_fast(legs):
 def test_the_held_out_path_is_not_among_the_fitted_ones(legs):
     ways = {use: set() for use in LegPurpose}
     for before, leg in pairwise(legs):
-        ways[leg.use].add(tuple(np.round(leg.halt.q - before.halt.q, 6)))
+        ways[leg.use].add(tuple(np.round(leg.waypoint.q - before.waypoint.q, 6)))
     assert ways[LegPurpose.HELD_OUT]
     assert not ways[LegPurpose.HELD_OUT] & ways[LegPurpose.FIT]
 

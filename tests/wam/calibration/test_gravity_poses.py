@@ -13,7 +13,7 @@ from wam.calibration.free_space import (
     check_poses,
     elbow_position,
     is_clear,
-    lowest,
+    lowest_height,
 )
 from wam.calibration.poses import (
     APPROACH_SPEED,
@@ -66,22 +66,22 @@ def test_the_poses_condition_all_gravity_parameters_well(model, count):
 def test_the_arm_stays_above_the_floor_once_it_has_risen(model, halts):
     for here, halt in pairwise(halts[:-1]):
         path = here.q + np.linspace(0, 1, 50)[:, None] * (halt.q - here.q)
-        assert lowest(model, path).min() > FLOOR - 0.003
+        assert lowest_height(model, path).min() > FLOOR - 0.003
 
 
 def test_leaving_and_reaching_the_container_never_goes_below_its_own_height(
     model, halts
 ):
-    start = lowest(model, IN_CONTAINER[None])[0]
+    start = lowest_height(model, IN_CONTAINER[None])[0]
     assert start < FLOOR
     for a, b in ((IN_CONTAINER, halts[0].q), (halts[-2].q, halts[-1].q)):
         path = a + np.linspace(0, 1, 50)[:, None] * (b - a)
-        assert lowest(model, path).min() > start - 0.003
+        assert lowest_height(model, path).min() > start - 0.003
 
 
 def test_a_path_that_dips_is_not_clear(model):
     ends = np.array([TWISTED, UPRIGHT])
-    assert lowest(model, ends).min() == pytest.approx(0.115, abs=0.001)
+    assert lowest_height(model, ends).min() == pytest.approx(0.115, abs=0.001)
     assert not is_clear(model, ends[0], ends[1], FLOOR)
     assert not is_clear(model, ends[1], ends[0], FLOOR)
     assert is_clear(model, ends[0], ends[1], 0.0)  # it dips to 0.05 m
@@ -96,7 +96,7 @@ def test_a_path_that_dips_below_the_floor_leaves_the_workspace(model):
 def test_the_elbow_is_checked_too(model):
     leaning = np.array([0.0, -1.5, 0.0, 1.6, 0.0, 0.0, 0.0])
     assert model.sole_pose(leaning)[0][2] > 0.3
-    assert lowest(model, leaning[None])[0] < 0.0
+    assert lowest_height(model, leaning[None])[0] < 0.0
 
 
 def test_measuring_poses_keep_clear_of_the_joint_stops(model, halts):
@@ -122,7 +122,7 @@ def test_poses_are_visited_nearest_first(model, choose):
 @pytest.mark.parametrize("choose", [choose_poses, choose_orientations])
 def test_the_only_free_pose_is_selected(model, poses, choose):
     class Narrow(FreeSpace):
-        def holds(self, q):
+        def is_free(self, q):
             return float(np.abs(q - poses[0]).max()) < OFFSET + 1e-6
 
     space = Narrow(FLOOR)
@@ -213,7 +213,7 @@ def test_a_pose_beyond_a_stop_is_refused_with_its_joint(model, joint, side):
 
 def test_the_upright_pose_has_elbow_and_foot_high(model):
     upright = np.array(UPRIGHT)
-    assert lowest(model, upright[None])[0] > FLOOR + 0.1
+    assert lowest_height(model, upright[None])[0] > FLOOR + 0.1
     assert (upright > model.constants.q_lower + MARGIN).all()
     assert (upright < model.constants.q_upper - MARGIN).all()
 
@@ -267,7 +267,7 @@ def test_the_sole_limits_the_speed_of_a_leg(model):
 def test_a_path_is_no_lower_than_the_floor_or_its_ends(
     model, monkeypatch, heights, is_free
 ):
-    monkeypatch.setattr(free_space, "lowest", lambda *_: np.array(heights))
+    monkeypatch.setattr(free_space, "lowest_height", lambda *_: np.array(heights))
     assert is_clear(model, np.zeros(7), np.ones(7), 0.33) is is_free
 
 
@@ -305,14 +305,14 @@ def test_a_pose_is_chosen_only_if_both_approaches_are_free(model):
     class Asked(FreeSpace):
         asked: ClassVar[set] = set()
 
-        def holds(self, q):
+        def is_free(self, q):
             self.asked.add(tuple(np.round(q, 6)))
-            return super().holds(q)
+            return super().is_free(q)
 
     for pose in choose_poses(model, 4, Asked(FLOOR)):
         for side in (-OFFSET, 0.0, OFFSET):
             assert tuple(np.round(pose + side, 6)) in Asked.asked
-            assert lowest(model, (pose + side)[None])[0] > FLOOR
+            assert lowest_height(model, (pose + side)[None])[0] > FLOOR
 
 
 class ClosedTo(FreeSpace):
@@ -353,7 +353,7 @@ def test_a_wrist_is_turned_in_the_first_free_direction(model, closed, joint, ang
 
 def test_a_wrist_that_cannot_turn_anywhere_is_refused(model):
     class Closed(FreeSpace):
-        def holds(self, q):
+        def is_free(self, q):
             return False
 
     with pytest.raises(SettingsError, match="wrist"):

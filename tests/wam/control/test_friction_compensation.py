@@ -245,7 +245,7 @@ def test_oscillation_too_fast_for_a_hand_disables_compensation():
     angles = np.zeros((1000, 7))
     angles[:, 0] = 0.02 * np.array(CONSTANTS.j2mp)[0, 0] * np.sin(cycles * 0.1)  # 8 Hz
     after(compensation, angles)
-    assert compensation.swung_motor == 1
+    assert compensation.oscillating_motor == 1
     assert not after(compensation, turning(1, 0.3), 2000)[-1].any()
 
 
@@ -255,7 +255,7 @@ def test_shaking_by_hand_does_not_disable_compensation():
     angles = np.zeros((2500, 7))
     angles[:, 0] = 0.2 * np.array(CONSTANTS.j2mp)[0, 0] * np.sin(cycles * 0.0251)
     after(compensation, angles)
-    assert compensation.swung_motor == 0
+    assert compensation.oscillating_motor == 0
 
 
 def test_a_silent_motor_makes_no_step():
@@ -335,7 +335,7 @@ def test_fast_repeated_reversals_are_oscillation(turns, gap, is_over):
         angles[1 + turn * gap : 1 + (turn + 1) * gap, 2] = end * (turn % 2 == 0)
     after(compensation, angles, 1000)
 
-    assert (compensation.swung_motor == 3) is is_over
+    assert (compensation.oscillating_motor == 3) is is_over
     assert compensation.metadata()["friction:swung_motor"] == str(3 * is_over)
 
 
@@ -348,7 +348,7 @@ def test_compensation_of_an_oscillating_motor_fades_evenly():
     for turn in range(0, 12, 2):
         angles[1 + turn * 45 : 1 + (turn + 1) * 45, 2] = end
     tau = after(compensation, angles)
-    assert compensation.swung_motor == 3
+    assert compensation.oscillating_motor == 3
     assert tau[last] == pytest.approx(-tau[last - 1])
     assert np.abs(tau[last]).max() > 0.1
     for cycles, share in ((0, 1.0), (10, 0.8), (25, 0.5), (50, 0.0), (90, 0.0)):
@@ -358,8 +358,8 @@ def test_compensation_of_an_oscillating_motor_fades_evenly():
 def test_remaining_compensation_fades_evenly():
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
     whole = after(compensation, turning(1, 0.3))[-1]
-    compensation.rest(10**9)
-    left = [compensation.resting(10**9 + k * 25_000_000) for k in range(5)]
+    compensation.stop(10**9)
+    left = [compensation.fading_torque(10**9 + k * 25_000_000) for k in range(5)]
 
     for share, tau in zip((1.0, 0.75, 0.5, 0.25), left, strict=False):
         assert tau == pytest.approx(share * whole)
@@ -409,7 +409,7 @@ def test_repeated_one_way_motion_is_not_oscillation():
     angles[:, 2] = np.where(np.arange(400) // 10 % 2, 0.9 * back, 0.0)
     after(compensation, angles)
 
-    assert compensation.swung_motor == 0
+    assert compensation.oscillating_motor == 0
 
 
 def test_ripple_reduces_the_load_dependent_compensation():

@@ -59,7 +59,7 @@ def field_set(index, bits):
 )
 def test_an_ambiguous_monitor_is_named_and_the_arm_starts(index, bits):
     info = Bench(field_set(index, bits)).arm.start()
-    assert info.pendant.unclear == (MONITORS[index],)
+    assert info.pendant.inconsistent_monitors == (MONITORS[index],)
     (warning,) = info.warnings
     assert MONITORS[index] in warning
     assert f"{field_set(index, bits)(CALM):08X}" in warning
@@ -67,7 +67,7 @@ def test_an_ambiguous_monitor_is_named_and_the_arm_starts(index, bits):
 
 def test_an_empty_word_names_every_monitor_and_no_fault():
     info = Bench(lambda _: 0).arm.start()
-    assert info.pendant.unclear == MONITORS
+    assert info.pendant.inconsistent_monitors == MONITORS
     assert (info.pendant.faults, info.pendant.warnings) == ((), ())
 
 
@@ -81,7 +81,7 @@ def test_a_module_without_property_pen_is_driven_with_a_warning():
     info = bench.arm.start()
     (warning,) = info.warnings
     assert "GET PEN" in warning
-    assert info.pendant.unclear == MONITORS
+    assert info.pendant.inconsistent_monitors == MONITORS
     assert info.safety_mode is SafetyMode.IDLE
 
 

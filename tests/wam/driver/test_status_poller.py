@@ -91,7 +91,7 @@ def test_the_newest_telemetry_is_kept(bench):
     bench.run(28 * 50 + 1)
     end = bench.arm.health()
     assert [p.bus_voltage for p in end] == [41] * 7
-    assert all(p.is_news(bench.rig.clock.t_ns) for p in end)
+    assert all(p.is_recent(bench.rig.clock.t_ns) for p in end)
 
 
 def test_warnings_and_faults_of_the_pendant_are_reported(bench):
@@ -189,7 +189,7 @@ def test_a_silent_puck_is_shown_with_the_age_of_its_last_reply(bench):
     bench.rig.network.silence(3)
     bench.run(7 * 50 * 5)  # five questions to each puck
     now_ns, pucks = bench.rig.clock.t_ns, bench.arm.health()
-    assert (pucks[2].puck_degc, pucks[2].is_news(now_ns)) == (35, False)
+    assert (pucks[2].puck_degc, pucks[2].is_recent(now_ns)) == (35, False)
     assert temperature_range(pucks, now_ns) == "33-35 °C, puck 3 silent for 4 s"
     fields = health_metadata(pucks, now_ns)
     assert fields["pucks:temperature_degc"] == "35 35 ? 35 35 35 35"
@@ -335,7 +335,7 @@ def test_a_start_clears_earlier_doubts_and_exempts_ambiguous_monitors():
     poller.contradict([2])
     poller.begin(NO_PENDANT)
     assert (poller.is_lowering, poller.contradicted_by) == (False, set())
-    assert poller.excused == NO_PENDANT.unclear != ()
+    assert poller.excused == NO_PENDANT.inconsistent_monitors != ()
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,7 @@ _HEADS = (
 BANDS = (("coverage50", 0.50), ("coverage90", 0.90), ("coverage95", 0.95))
 
 
-def uncertainty(study: Study) -> ReportTable:
+def uncertainty_table(study: Study) -> ReportTable:
     """Return the table of probabilistic scores and band coverage."""
     rows = [
         [name, TITLES[model], *_cells(result, model)]

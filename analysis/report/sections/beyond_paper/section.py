@@ -24,7 +24,7 @@ from analysis.report.sections.beyond_paper.noise import NOISE_FIGURE, noise_tabl
 from analysis.report.sections.beyond_paper.paired_comparisons import paired_tables
 from analysis.report.sections.beyond_paper.predicted_uncertainty import (
     CALIBRATION_FIGURE,
-    uncertainty,
+    uncertainty_table,
 )
 from analysis.report.sections.beyond_paper.residuals import (
     RESIDUALS_FIGURE,
@@ -40,7 +40,7 @@ def beyond_tables(results: StudyResults) -> list[ReportTable]:
     """Return the non-empty tables of the section."""
     study = results.study
     tables = [
-        uncertainty(study),
+        uncertainty_table(study),
         independent_samples(results),
         *paired_tables(study),
         noise_table(results),

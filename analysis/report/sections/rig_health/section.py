@@ -20,7 +20,7 @@ from analysis.report.style import Axes, Figure, name_ticks, new_figure, terrain_
 _NAMED = 8  # largest number of session names below a figure
 
 
-def health(rig: Sequence[RigTrial]) -> ReportTable:
+def health_table(rig: Sequence[RigTrial]) -> ReportTable:
     """Return the table with one row per trial."""
     return ReportTable(
         "Rig health by trial",
@@ -268,7 +268,7 @@ DRIFT_FIGURE = FigureSpec(
 
 
 def _tables(results: StudyResults, _: ReportContext) -> list[ReportTable]:
-    return [health(results.rig)] if results.rig else []
+    return [health_table(results.rig)] if results.rig else []
 
 
 SECTION = Section(

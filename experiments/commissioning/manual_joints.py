@@ -3,7 +3,12 @@
 import numpy as np
 
 from experiments.commissioning.evidence.order import StepId
-from experiments.commissioning.judging import Found, Judgement, found, judged
+from experiments.commissioning.judging import (
+    JudgedQuantity,
+    Judgement,
+    judge_quantity,
+    judged,
+)
 from experiments.commissioning.recording import Values
 from experiments.commissioning.scene import Scene
 from experiments.commissioning.step import Step
@@ -76,7 +81,7 @@ def judge(values: Values) -> Judgement:
     """Judge order, direction, scale and zero of every encoder."""
     lower, upper = values["q_lower"], values["q_upper"]
     low, high = values["low"], values["high"]
-    rows: list[Found] = []
+    rows: list[JudgedQuantity] = []
     for i in range(7):
         travel = high[i, i] - low[i, i]
         others = np.abs(high[i] - low[i])
@@ -85,12 +90,12 @@ def judge(values: Values) -> Judgement:
         off = max(low[i, i] - lower[i], high[i, i] - upper[i], key=abs)
         share = travel / (upper[i] - lower[i]) - 1.0
         rows += [
-            found("sense", float(np.sign(travel)), joint=i + 1),
-            found(
+            judge_quantity("sense", float(np.sign(travel)), joint=i + 1),
+            judge_quantity(
                 "beside", np.degrees(others[largest]), joint=i + 1, other=largest + 1
             ),
-            found("travel", 100.0 * share, joint=i + 1),
-            found("stop_angle", np.degrees(off), joint=i + 1),
+            judge_quantity("travel", 100.0 * share, joint=i + 1),
+            judge_quantity("stop_angle", np.degrees(off), joint=i + 1),
         ]
     return judged(rows)
 

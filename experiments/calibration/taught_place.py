@@ -10,7 +10,7 @@ from acquisition.ipc.shared_sensor import unpack_wrenches
 from acquisition.sample import Record
 from acquisition.simulation import ENDS
 from experiments.calibration.calibration import CalibrationContext, GuidedCalibration
-from experiments.calibration.touching import afloat, touch
+from experiments.calibration.touching import floating_arm, touch
 from experiments.operator.prompts import Prompt
 from experiments.run.console_loop import TICK
 from experiments.session.sidecar import TrialName
@@ -84,7 +84,7 @@ def collect(context: CalibrationContext) -> list[EndTouch]:
     """
     console_loop, model = context.console_loop, context.rig.model
     touches: list[EndTouch] = []
-    with afloat(console_loop):
+    with floating_arm(console_loop):
         payload = _payload_in_the_air(context)
         for number in range(ROUNDS * len(_ENDS)):
             end = _ENDS[number % len(_ENDS)]

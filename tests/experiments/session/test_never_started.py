@@ -5,8 +5,8 @@ import os
 import pytest
 
 from experiments.session.lock import session_lock
+from experiments.session.never_started import remove_never_started
 from experiments.session.store import create_session
-from experiments.session.unbegun import remove_never_started
 
 MINUTE = 60_000_000_000
 NOW = 1_800_000_000_000_000_000

@@ -7,7 +7,7 @@ import pytest
 from acquisition.errors import TrialFileError
 from experiments.export.checksums import SUMS, write_sums
 from experiments.export.crate import METADATA
-from experiments.export.witnesses import changed_publication
+from experiments.export.publication_check import changed_publication
 from tests.corpus.used_session import session_files
 
 SESSION = "sessions/2027-01-15_S001_TF.fake"

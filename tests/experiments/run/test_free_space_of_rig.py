@@ -5,7 +5,7 @@ import pytest
 
 from acquisition.errors import SettingsError
 from experiments.rig.build import build_tool, terrain_frame
-from experiments.run.surroundings import container_box, free_space
+from experiments.run.free_space_of_rig import container_box, free_space
 from experiments.settings.load import load_settings
 from wam.calibration.free_space import FreeSpace, check_poses
 from wam.calibration.poses import choose_orientations, choose_poses, plan_waypoints

@@ -5,7 +5,7 @@ import pytest
 
 import experiments.operator.auto_operator as operator
 from acquisition.errors import PreflightError, SettingsError
-from experiments.calibration.place import EndTouch, fit_ends
+from experiments.calibration.taught_place import EndTouch, fit_ends
 from experiments.settings.load import load_settings
 from experiments.settings.places import TaughtPlace
 from tests.experiments.program import traction, write_config
