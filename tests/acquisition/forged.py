@@ -1,4 +1,4 @@
-"""MCAP files made by hand: other profiles, and chunks of any content."""
+"""Hand-made MCAP files: other profiles, and chunks of any content."""
 
 import io
 import struct
@@ -49,7 +49,7 @@ def one_message(compression="zstd", schema=None):
 
 
 def chunk_content(message=CYCLE.template, compression="zstd"):
-    """Return what that chunk unpacks to, with another `message` in it."""
+    """Return the unpacked content of that chunk, with `message` as its message."""
     data = one_message(compression)
     chunk = span_of(data, CHUNK)
     packed = data[chunk.body + CHUNK_FIELDS + len(compression) : chunk.end]
@@ -57,7 +57,7 @@ def chunk_content(message=CYCLE.template, compression="zstd"):
 
 
 def with_chunk(payload, size, compression="zstd"):
-    """Return that trial with a chunk of `payload`, said to unpack to `size` bytes."""
+    """Return that trial with a chunk of `payload` that declares `size` unpacked bytes."""
     data = one_message(compression)
     chunk = span_of(data, CHUNK)
     name = compression.encode()

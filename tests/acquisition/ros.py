@@ -1,4 +1,4 @@
-"""Messages as an independent ROS 2 library understands them."""
+"""Messages decoded and encoded by an independent ROS 2 library."""
 
 from functools import cache
 from typing import Any
@@ -22,7 +22,7 @@ def decode(type_name, payload) -> Any:
 
 
 def encode(type_name, message):
-    """Return `message` (as `decode` gives it) serialised by the other library."""
+    """Return `message` (a result of `decode`) serialised by the other library."""
     return bytes(_store(type_name).serialize_cdr(message, type_name))
 
 
@@ -31,9 +31,9 @@ def messages_of(path):
     reader = McapReader(path)
     reader.open()
     try:
-        found = {connection.topic: [] for connection in reader.connections}
+        by_topic = {connection.topic: [] for connection in reader.connections}
         for connection, time, data in reader.messages(reader.connections):
-            found[connection.topic].append((time, bytes(data)))
+            by_topic[connection.topic].append((time, bytes(data)))
     finally:
         reader.close()
-    return found
+    return by_topic

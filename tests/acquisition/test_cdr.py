@@ -60,7 +60,7 @@ def test_strings_agree_with_an_independent_writer(text):
     assert encode("std_msgs/msg/String", message) == payload
 
 
-def test_text_that_is_not_unicode_does_not_end_a_recording():
+def test_text_that_is_not_unicode_is_encoded_with_a_replacement():
     assert decode("std_msgs/msg/String", encode_string("mark \udc80")).data == "mark ?"
 
 
@@ -90,9 +90,9 @@ def test_the_joint_view_repeats_the_cycle(record):
 def test_the_wrench_view_repeats_the_cycle(record):
     message = decode(VIEWS["/wrench"], encode_views(record, 0)["/wrench"])
     force, torque = message.wrench.force, message.wrench.torque
-    found = [force.x, force.y, force.z, torque.x, torque.y, torque.z]
+    components = [force.x, force.y, force.z, torque.x, torque.y, torque.z]
     assert message.header.frame_id == "ft_sensor"
-    assert found == record["wrench"].tolist()
+    assert components == record["wrench"].tolist()
 
 
 def test_the_pose_view_repeats_the_cycle(record):
@@ -105,5 +105,5 @@ def test_the_pose_view_repeats_the_cycle(record):
 def test_the_twist_view_repeats_the_cycle(record):
     twist = decode(VIEWS["/foot/twist"], encode_views(record, 0)["/foot/twist"]).twist
     linear, angular = twist.linear, twist.angular
-    found = [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
-    assert found == record["foot_velocity"].tolist()
+    components = [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
+    assert components == record["foot_velocity"].tolist()

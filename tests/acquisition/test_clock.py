@@ -24,7 +24,7 @@ class Link:
 
 
 class UnevenClock(SteppedClock):
-    """Every reading of the monotonic clock takes as long as the list says."""
+    """A clock whose readings of the monotonic time take the listed durations."""
 
     def __init__(self, durations_ns):
         super().__init__()
@@ -68,7 +68,7 @@ def test_a_signal_does_not_shorten_a_sleep(monkeypatch):
     assert answers == []
 
 
-def test_a_system_without_absolute_sleep_sleeps_as_long(monkeypatch):
+def test_a_system_without_absolute_sleep_sleeps_for_the_remaining_time(monkeypatch):
     monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: SimpleNamespace())
     clock = SystemClock()
     slept = []

@@ -6,7 +6,7 @@ THREADS = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 FLAGS = "fpu avx2 avx512f avx512dq avx512cd avx512bw avx512vl"
 
 
-def described(tmp_path, vendor="AuthenticAMD", family="26", flags=FLAGS):
+def write_cpuinfo(tmp_path, vendor="AuthenticAMD", family="26", flags=FLAGS):
     path = tmp_path / "cpuinfo"
     core = f"vendor_id\t: {vendor}\ncpu family\t: {family}\nflags\t\t: {flags}\n\n"
     path.write_text(f"processor\t: 0\n{core}processor\t: 1\n{core}")
@@ -14,8 +14,8 @@ def described(tmp_path, vendor="AuthenticAMD", family="26", flags=FLAGS):
 
 
 def test_a_processor_unknown_to_openblas_gets_compatible_kernels(tmp_path):
-    named = openblas_settings(described(tmp_path))
-    assert named == THREADS | {"OPENBLAS_CORETYPE": "SkylakeX"}
+    environment = openblas_settings(write_cpuinfo(tmp_path))
+    assert environment == THREADS | {"OPENBLAS_CORETYPE": "SkylakeX"}
 
 
 @pytest.mark.parametrize(
@@ -28,7 +28,7 @@ def test_a_processor_unknown_to_openblas_gets_compatible_kernels(tmp_path):
     ],
 )
 def test_other_processors_are_left_to_openblas(tmp_path, other):
-    assert openblas_settings(described(tmp_path, **other)) == THREADS
+    assert openblas_settings(write_cpuinfo(tmp_path, **other)) == THREADS
 
 
 def test_without_processor_information_there_is_one_thread(tmp_path):

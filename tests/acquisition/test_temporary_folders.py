@@ -24,7 +24,7 @@ with temporary_folder("room", Path(sys.argv[1])) as folder:
 
 @pytest.fixture
 def holder(tmp_path):
-    """Give a process that holds a folder, and the folder's path."""
+    """A process that holds a folder, and the folder's path."""
     process = subprocess.Popen(
         [sys.executable, "-c", HOLD, str(tmp_path)],
         stdin=subprocess.PIPE,
@@ -79,7 +79,7 @@ def test_a_locked_folder_is_kept_though_its_process_is_unknown(tmp_path):
     assert not path.exists()
 
 
-def test_without_locks_a_folder_in_use_is_unknown(tmp_path, monkeypatch):
+def test_without_file_locks_no_folder_is_removed(tmp_path, monkeypatch):
     def flock(*_):
         raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 

@@ -1,4 +1,4 @@
-"""What models of files share: few problems of hostile files, and how one is told."""
+"""Hostile files give few problems, and the first one is reported with its location."""
 
 import json
 
@@ -63,7 +63,7 @@ def test_the_message_of_another_check_is_passed_on():
     assert first_problem(caught.value).startswith("Input should be a valid integer")
 
 
-def test_a_package_of_a_million_wrong_files_has_one_problem():
+def test_a_package_of_many_wrong_files_has_one_problem():
     text = json.dumps({"name": "p", "resources": [1] * 1_000_000})
     with pytest.raises(ValidationError) as caught:
         DataPackage.model_validate_json(text)
@@ -71,7 +71,7 @@ def test_a_package_of_a_million_wrong_files_has_one_problem():
 
 
 @pytest.mark.parametrize(
-    ("place", "value"),
+    ("keys", "value"),
     [
         (("shares",), ["a"] * 1000),
         (("axes", "F_n"), ["a"] * 1000),
@@ -83,12 +83,12 @@ def test_a_package_of_a_million_wrong_files_has_one_problem():
         (("terrains", "S0", "roughness"), {str(k): "a" for k in range(1000)}),
     ],
 )
-def test_a_database_of_a_thousand_wrong_values_has_few_problems(tmp_path, place, value):
+def test_a_database_of_many_wrong_values_has_few_problems(tmp_path, keys, value):
     content = json.loads(samples()["database"])
-    where = content
-    for key in place[:-1]:
-        where = where[key]
-    where[place[-1]] = value
+    parent = content
+    for key in keys[:-1]:
+        parent = parent[key]
+    parent[keys[-1]] = value
     path = tmp_path / "terrains.json"
     path.write_text(json.dumps(content))
     with pytest.raises(SettingsError, match="not a terrain database") as caught:

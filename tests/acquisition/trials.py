@@ -98,9 +98,9 @@ def summary_start(data):
 
 
 def resealed(data):
-    """Return `data` with both section checksums made right again.
+    """Return `data` with both section checksums recomputed.
 
-    What a forger would do; a damaged disk never does.
+    As a forger would do, but never a damaged disk.
     """
     data = bytearray(data)
     summary = summary_start(data)

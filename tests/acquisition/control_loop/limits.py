@@ -1,10 +1,10 @@
-"""The guard's limits that tests judge by; each test names those it is about."""
+"""Guard limits for tests; each test overrides the limits that it checks."""
 
 from acquisition.control_loop.limits import GuardLimits
 
 
 def guard_limits(**changes):
-    """Return limits like those of an arm, with `changes` by their names."""
+    """Return guard limits of an arm, with `changes` by name."""
     limits = {
         "q_lower": (-2.6, -2.0, -2.8, -0.9, -4.76, -1.6, -3.0),
         "q_upper": (2.6, 2.0, 2.8, 3.1, 1.24, 1.6, 3.0),

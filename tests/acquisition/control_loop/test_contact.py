@@ -151,7 +151,7 @@ def steps(*forces):
 
 
 def test_force_growth_is_judged_once_its_window_has_data():
-    """The last point, of points 50 ms apart, comes 50 ms before the window ends."""
+    """Points are 50 ms apart; the last one comes 50 ms before the window ends."""
     verdict, cycle = follow(steps(10.0, *[60.0] * 12))
     assert verdict.fault is Fault.CONTACT_GROWTH
     assert cycle * PERIOD_NS == GROWTH_NS - 50 * NS_PER_MS
@@ -159,7 +159,7 @@ def test_force_growth_is_judged_once_its_window_has_data():
 
 
 def test_force_growth_is_measured_over_its_window():
-    """At its end the first point still counts, and is forgotten at the next."""
+    """The first point counts until the window ends, and is dropped at the next one."""
     verdict, cycle = follow(steps(10.0, *[30.0] * 8, *[60.0] * 5))
     at = (verdict.fault, cycle * PERIOD_NS)
     assert at == (Fault.CONTACT_GROWTH, GROWTH_NS)
@@ -179,7 +179,7 @@ def test_a_foot_that_moves_less_than_the_limit_is_at_rest(direction, share, faul
 
 @pytest.mark.parametrize("cycles", [100, 300])
 def test_a_force_on_a_moving_foot_is_not_growth(cycles):
-    """However little may grow."""
+    """Even with a very low limit of growth."""
     limits, state = replace(LIMITS, contact_growth=0.1), ContactState()
     for cycle in range(cycles):
         seen = load(20.0 + 0.2 * cycle, sole=(0.003 * cycle, 0.0, 0.0))
@@ -188,8 +188,8 @@ def test_a_force_on_a_moving_foot_is_not_growth(cycles):
         assert verdict is OK
 
 
-def test_a_dip_of_the_force_delays_its_growth():
-    """Of ten points, the ninth or the last is of a moment with less force."""
+def test_a_dip_of_the_force_delays_or_prevents_a_growth_fault():
+    """The ninth or the last of ten points has less force."""
     early = steps(10.0, *[60.0] * 7, 30.0, *[60.0] * 5)
     verdict, cycle = follow(early)
     at = (verdict.fault, cycle * PERIOD_NS)
@@ -200,7 +200,7 @@ def test_a_dip_of_the_force_delays_its_growth():
     assert follow(for_one_cycle)[0] is OK
 
 
-def test_slow_or_moving_force_growth_is_a_push():
+def test_slow_growth_or_growth_on_a_moving_foot_is_not_a_fault():
     assert follow(ramp(60.0, 1.4))[0] is OK
     assert follow(ramp(95.0, 0.9, speed=0.01))[0] is OK
     assert follow(ramp(95.0, 0.9), is_recording=False)[0] is OK
@@ -211,7 +211,7 @@ def test_a_knock_on_a_foot_at_rest_is_not_growth():
     assert follow((quiet + knock) * 4)[0] is OK
 
 
-def test_without_a_fresh_force_nothing_is_judged():
+def test_contact_is_not_judged_without_a_fresh_force():
     assert follow([load(force=200.0)] * 4 + [None] * 50)[0] is OK
 
 
@@ -237,7 +237,7 @@ def test_a_sample_without_a_force_has_no_load():
 
 
 class FootUnderLoad(Observer):
-    """Shows the force of the wrench as that on the foot."""
+    """Copies the wrench of the sensor to the foot."""
 
     def observe(self, reading, wrench, sample):
         if wrench is not None:
@@ -245,7 +245,7 @@ class FootUnderLoad(Observer):
         return super().observe(reading, wrench, sample)
 
     def set_bias(self, bias):
-        """Have no bias."""
+        """Ignore the bias."""
 
 
 @pytest.fixture
@@ -280,12 +280,12 @@ def test_a_load_that_grows_as_the_trial_ends_makes_the_arm_hold(bench):
     assert bench.state is ArmState.HOLD
 
 
-def test_before_the_first_tare_the_load_is_unknown(bench):
+def test_a_load_is_not_judged_before_the_first_tare(bench):
     bench.run(10, force=160.0)
     assert bench.reason == ""
 
 
-def test_a_rejected_position_gets_torques_and_a_missing_one_keeps_the_last(bench):
+def test_torques_are_sent_for_a_rejected_position_but_not_for_a_missing_one(bench):
     bench.arm.missing = 1
     sent = len(bench.arm.sent)
     bench.run()

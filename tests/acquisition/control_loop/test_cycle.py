@@ -38,7 +38,7 @@ TORQUE = {
 
 
 class Arm:
-    """An arm that says what it is told to say and keeps what it was sent."""
+    """A scripted arm that keeps the torques it was sent."""
 
     def __init__(self):
         self.mode = SafetyMode.ACTIVE
@@ -152,7 +152,7 @@ class Law:
 
 
 class Observer:
-    """Shows the force along z of the wrench it is given."""
+    """Reports the force along z of a given wrench."""
 
     def __init__(self):
         self.speed = 0.0
@@ -216,7 +216,7 @@ class Bench:
         return self.run()
 
     def start(self):
-        """Let the idle arm be ready for its activation."""
+        """Make the idle arm wait for its activation."""
         self.arm.mode = SafetyMode.IDLE
         self.run()
         self.cycle.start()
@@ -305,7 +305,7 @@ def test_a_missing_reply_sends_no_torque(bench):
     bench.law.torques = {ArmState.FLOAT: 9.0}  # wanted, and not sent
     record = bench.run()
     assert len(bench.arm.sent) == sent
-    assert record["torque_command"].tolist() == [1.0] * 7  # what the motors still have
+    assert record["torque_command"].tolist() == [1.0] * 7  # the motors keep this torque
     assert not has(record, Flag.ARM_FRESH)
     assert not has(record, Flag.TORQUE_CLIPPED)
 
@@ -337,7 +337,7 @@ def test_idle_does_not_wait_for_a_complete_reading(bench):
     assert bench.arm.idled == 1
 
 
-def test_a_counter_of_the_sensor_that_is_wider_than_its_field_wraps(bench):
+def test_a_sensor_counter_wider_than_its_field_wraps(bench):
     for counter, recorded in ((2**32 - 1, 2**32 - 1), (2**32 + 5, 5)):
         bench.sensor.queue.append(bench.wrench(5.0, counter=counter))
         assert bench.run(force=None)["ft_counter"] == recorded
@@ -381,7 +381,7 @@ def test_an_invalid_sample_is_not_used(bench):
     assert bench.wrenches == [good, bad]
 
 
-def test_invalid_samples_alone_age_the_force(bench):
+def test_the_force_ages_while_only_invalid_samples_arrive(bench):
     bench.run()
     for _ in range(4):
         bench.sensor.queue = [bench.wrench(9.0, is_valid=False)]
@@ -411,7 +411,7 @@ def test_a_late_cycle_is_flagged(bench):
 
 @pytest.mark.parametrize("mode", SafetyMode)
 def test_the_safety_mode_is_in_the_flags(bench, mode):
-    if mode is SafetyMode.ACTIVE:  # which is idled unless it is asked for
+    if mode is SafetyMode.ACTIVE:  # ACTIVE without a request is idled
         bench.enter(ArmState.FLOAT)
     bench.arm.mode = mode
     assert int(bench.run()["flags"]) & SAFETY_MODE_MASK == mode
@@ -465,7 +465,7 @@ def test_a_verdict_of_hold_ends_floating(bench):
     assert bench.reason == "joint7-slip"
 
 
-def test_a_verdict_ends_the_trial_watch(bench):
+def test_a_verdict_ends_the_recording(bench):
     bench.enter(ArmState.FLOAT)
     bench.cycle.is_recording = True
     bench.law.offset = 0.06
@@ -489,7 +489,7 @@ def test_a_sensor_that_never_sent_a_sample_stops_a_trial(bench):
     assert bench.reason == "ft-stale"
 
 
-def test_a_fault_is_never_made_milder(bench):
+def test_a_later_fault_never_makes_the_reaction_milder(bench):
     bench.enter(ArmState.FLOAT)
     bench.arm.qd = np.full(7, 1.6)
     bench.run()
@@ -498,7 +498,7 @@ def test_a_fault_is_never_made_milder(bench):
     bench.run()
     assert (bench.state, bench.reasons) == (
         ArmState.DAMP,
-        ["can-silence", "overspeed"],  # what ends the session is told first
+        ["can-silence", "overspeed"],  # a fault that ends the session is reported first
     )
 
 
@@ -712,12 +712,12 @@ def test_an_idling_verdict_stays_latched_after_a_later_one():
     status = ControlStatus()
     status.latch(replace(fault("console-silent"), action=Action.IDLE))
     status.latch(fault("can-silence"))
-    assert status.verdict.action is Action.HOLD  # it is told first
+    assert status.verdict.action is Action.HOLD  # reported first
     assert status.is_idled
 
 
 @pytest.mark.parametrize("state", sorted(TORQUE))
-def test_a_verdict_that_idles_stands_until_a_start(bench, state):
+def test_an_idling_verdict_stays_active_until_a_start(bench, state):
     bench.enter(ArmState.FLOAT)
     bench.cycle.report(fault("motor-stuck"))
     bench.run()
@@ -732,7 +732,7 @@ def test_a_verdict_that_idles_stands_until_a_start(bench, state):
     ("first", "second"),
     [("console-silent", "motor-stuck"), ("motor-stuck", "console-silent")],
 )
-def test_of_two_verdicts_the_stricter_comes_first_and_both_stand(bench, first, second):
+def test_of_two_verdicts_the_stricter_comes_first_and_both_remain(bench, first, second):
     bench.enter(ArmState.FLOAT)
     for name in (first, second):
         bench.cycle.report(fault(name))
@@ -812,7 +812,7 @@ def test_a_request_does_not_reset_the_silence_of_a_module(bench):
     )
 
 
-def test_torques_with_a_module_silent_from_the_start_end_in_idle(bench):
+def test_a_hold_ends_if_the_safety_module_never_replied(bench):
     bench.arm.safety_heard_ns, bench.arm.mode = 0, SafetyMode.UNKNOWN
     bench.arm.is_confirmed = False
     bench.enter(ArmState.HOLD)
@@ -866,7 +866,7 @@ def test_an_unknown_arm_is_not_polled_until_torques_are_requested(bench):
 
 @pytest.fixture
 def proved(bench):
-    """Return a held arm that takes any proof and does nothing."""
+    """A held arm whose control law accepts any powered test and does nothing."""
     bench.law.prove = lambda proof, reading: None
     bench.law.is_testing = lambda: True
     bench.law.powered_test_excess = lambda reading, energy, is_powered: None
@@ -891,7 +891,7 @@ def test_a_heartbeat_test_sends_no_requests_until_it_ends(proved):
     proved.arm.missing = 0
     proved.run()
     assert proved.arm.asked_ns > asked_ns
-    silent(proved, LIMITS.idle_after_missing)  # nobody wanted this silence
+    silent(proved, LIMITS.idle_after_missing)  # unintended silence
     assert proved.reason == Fault.CAN_SILENCE
 
 
@@ -912,7 +912,7 @@ def test_a_request_ends_an_intended_silence(proved):
     assert proved.arm.asked_ns > asked_ns
 
 
-def test_nothing_is_known_before_the_first_cycle(bench):
+def test_the_status_before_the_first_cycle_is_idle_without_a_verdict(bench):
     assert bench.cycle.replies_ns == 0
     status = bench.cycle.status
     assert (status.state, status.safety) == (ArmState.IDLE, SafetyMode.UNKNOWN)
@@ -929,7 +929,7 @@ def test_the_wait_for_the_first_force_begins_with_the_first_cycle(bench):
 
 
 class Loaded(Observer):
-    """Shows the whole wrench that it is given, and takes the tare."""
+    """Copies the whole wrench to the sample, and keeps the bias."""
 
     def set_bias(self, bias):
         self.bias = bias
@@ -941,7 +941,7 @@ class Loaded(Observer):
 
 
 @pytest.mark.parametrize("is_tared", [True, False])
-def test_a_load_is_judged_once_known(bench, is_tared):
+def test_a_load_is_judged_only_after_a_tare(bench, is_tared):
     bench.observer = Loaded()
     bench.cycle = bench.make()
     bench.enter(ArmState.FLOAT)
@@ -986,7 +986,7 @@ def test_a_fault_of_the_same_severity_does_not_replace_the_first(bench):
 
 
 class ProvingLaw(Law):
-    """Is in a proof; keeps whether the motors were said to have power."""
+    """A law in a powered test; keeps whether the motors were reported as powered."""
 
     def __init__(self):
         super().__init__()

@@ -66,7 +66,7 @@ def test_every_fault_has_a_row_in_the_catalogue():
 
 
 @pytest.mark.parametrize("fault", Fault)
-def test_a_fault_stops_the_arm_and_a_lasting_one_takes_no_less(fault):
+def test_the_reaction_to_a_lasting_fault_is_not_milder(fault):
     first, lasting = verdict_for(fault), verdict_for(fault, is_lasting=True)
     assert 0 < first.severity <= lasting.severity
 

@@ -117,7 +117,7 @@ def circuit(mode, age_ns=0):
 
 
 LIMIT_TABLE = [
-    # fault, action, what just may be, what may not
+    # fault, action, just inside the limit, just outside
     (Fault.BUS_SHARED, Action.IDLE, {"foreign_id": None}, {"foreign_id": 0x404}),
     (Fault.E_STOP, Action.IDLE, circuit(ACTIVE), circuit(SafetyMode.E_STOP)),
     (Fault.PENDANT_IDLE, Action.IDLE, circuit(ACTIVE), circuit(BRAKED)),
@@ -195,7 +195,7 @@ def test_a_joint_may_reach_but_not_pass_its_limit(joint, side):
     ("field", "limits", "fault"),
     [("qd", LIMITS.speed, Fault.OVERSPEED), ("tau", LIMITS.torque, Fault.TORQUE_LIMIT)],
 )
-def test_a_joint_may_have_but_not_exceed_its_limit_of(
+def test_a_joint_may_reach_but_not_exceed_its_speed_or_torque_limit(
     joint, sign, field, limits, fault
 ):
     limit = float(limits[joint - 1])
@@ -260,7 +260,7 @@ def test_no_fault_hides_a_more_severe_one():
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_an_arm_that_is_not_powered_is_left_alone(name):
+def test_an_arm_without_commands_is_not_judged(name):
     idle = {"is_commanded": False, "is_recording": False}
     assert judge(**FAULTS[name], **idle).action is Action.NONE
 
@@ -273,7 +273,7 @@ def test_trial_faults_need_a_trial(name):
 @pytest.mark.parametrize(
     "name", sorted(set(FAULTS) - {Fault.JOINT7_SLIP, Fault.FT_STALE})
 )
-def test_the_other_limits_hold_without_a_trial_too(name):
+def test_the_other_limits_apply_outside_a_trial_too(name):
     assert judge(**FAULTS[name], is_recording=False).fault == name
 
 
@@ -283,7 +283,7 @@ HOME = np.array([0.0, -2.0, 0.0, 3.13, 0.0, 0.0, 0.0])
 def test_home_on_the_stops_is_no_fault():
     state, verdict = check(LIMITS, GuardState(), seen(q=HOME))
     assert verdict.action is Action.NONE
-    assert state.armed == 0b1110101  # joints 2 and 4 stand on theirs
+    assert state.armed == 0b1110101  # joints 2 and 4 are at their stops
 
 
 LOW, HIGH = (
@@ -314,7 +314,7 @@ def test_limits_are_armed_while_the_arm_is_idle():
     assert state.armed == 0x7F
 
 
-def test_an_extrapolated_position_arms_nothing():
+def test_an_extrapolated_position_arms_no_limit():
     state, _ = check(LIMITS, GuardState(), seen(**missing(1)))
     assert state.armed == 0
 
@@ -328,7 +328,7 @@ def test_only_joints_whose_limit_is_armed_are_judged():
 
 
 def late_cycles(times, state=ARMED):
-    """Return what late cycles at `times` come to, a punctual one before each."""
+    """Return state and verdict after late cycles at `times`, each after a punctual one."""
     verdict = OK
     for t_ns in times:
         state, _ = check(LIMITS, state, seen(host_ns=t_ns - 2 * MS))
@@ -357,7 +357,7 @@ def test_late_cycles_are_forgotten_after_the_window():
 
 
 def test_a_late_cycle_counts_for_exactly_the_window():
-    """The oldest is forgotten, the next one is a second old."""
+    """The oldest late cycle is dropped; the next one is exactly one window old."""
     state, _ = late_cycles(TOO_MANY)
     state, _ = check(LIMITS, state, seen(host_ns=S - 2 * MS))
     at_end = seen(is_late=True, host_ns=S + 10 * MS)
@@ -448,7 +448,7 @@ def motor_at_rest(motor, travel):
 
 
 @pytest.mark.parametrize("motor", [2, 6])
-def test_leading_motors_may_stand_for_their_limit_of_travel(motor):
+def test_a_motor_may_rest_up_to_its_limit_of_sole_travel(motor):
     limit = LIMITS.still_travel[motor - 1]
     assert motor_at_rest(motor, 0.99 * limit) is OK
     detail = motor_at_rest(motor, 1.01 * limit).detail
@@ -490,19 +490,20 @@ def test_a_motor_at_rest_keeps_the_state_object():
     assert check(ONE_MOTOR, state, again)[0] is state
 
 
-# m that the sole went while motors 2 to 6 of a sound arm stood still, at the most in 40
+# Longest travel of the sole [m] while motors 2 to 6 of a sound arm stood still, in 40
 # simulated trials at 0.4 to 1 of another arm's friction, without compensation.
 STICKING = (0.0354, 0.017, 0.0123, 0.0213, 0.0325)
 
 
 def test_a_motor_of_a_sound_arm_may_stick():
-    shares = [
-        most / way for most, way in zip(LIMITS.still_travel[1:6], STICKING, strict=True)
+    margins = [
+        limit / travel
+        for limit, travel in zip(LIMITS.still_travel[1:6], STICKING, strict=True)
     ]
-    assert min(shares) > 1.5
+    assert min(margins) > 1.5
 
 
-def test_only_motors_1_and_7_may_stand_for_a_whole_trial():
+def test_only_motors_1_and_7_may_rest_for_a_whole_trial():
     without = [i for i, travel in enumerate(LIMITS.still_travel, 1) if isinf(travel)]
     assert without == [1, 7]
     assert motor_at_rest(1, 1e3) is OK

@@ -9,7 +9,7 @@ MS = 1_000_000
 
 
 class Work:
-    """A cycle that takes as long as it is told, by cycle number."""
+    """A cycle with a scripted duration for each cycle number."""
 
     def __init__(self):
         self.clock = SteppedClock()

@@ -63,7 +63,7 @@ def foot(value):
 
 
 def along(axis):
-    """Return changes of a sole that went along one axis, for a travel [m]."""
+    """Return a function of travel [m] that moves the sole along one axis."""
     return lambda value: {"sole": tuple(value * (i == axis) for i in range(3))}
 
 
@@ -100,7 +100,7 @@ def test_each_limit_of_motion_trips_beyond_its_value(state, at, moving, limit, f
     assert verdict.ends_session
 
 
-def test_what_has_no_limit_in_a_state_does_not_trip():
+def test_quantities_without_a_limit_in_a_state_do_not_trip():
     settled = motion(LATER, HOLD, foot_speed=2.0 * LIMITS.activation_speed)
     assert judge(motion(0, HOLD), settled) is OK
     assert judge(motion(0, DAMP), motion(2, DAMP, energy=9.0)) is OK
@@ -139,7 +139,7 @@ def test_a_damped_arm_may_not_regain_energy():
     assert judge(begin, come, again) is OK
 
 
-def test_a_move_is_no_dragged_hold():
+def test_a_move_is_limited_in_energy_but_not_in_hold_travel():
     begin = motion(0, HOLD)
     ahead = {"sole": (0.5, 0.0, 0.0), "energy": 0.5, "is_moving": True}
     assert judge(begin, motion(LATER, HOLD, **ahead)) is OK
@@ -156,7 +156,7 @@ def test_hold_measures_travel_from_its_start():
 
 
 BEFORE = [
-    # state, ms since power and state, what is judged from the next moment on
+    # state, ms since power and state, motion that is not judged at that moment
     (HOLD, ACTIVATION, foot(1.01 * LIMITS.activation_speed)),
     (HOLD, ACTIVATION, energy(1.01 * LIMITS.activation_energy)),
     (HOLD, ACTIVATION, along(1)(1.01 * LIMITS.activation_travel)),
@@ -167,8 +167,8 @@ BEFORE = [
 
 
 @pytest.mark.parametrize(("state", "at", "seen"), BEFORE)
-def test_each_limit_of_motion_has_its_time(state, at, seen):
-    """The activation's ends, those of damping begin."""
+def test_each_limit_of_motion_applies_only_during_its_time(state, at, seen):
+    """Limits of the activation have ended, those of damping have not begun."""
     assert judge(motion(0, state), motion(at, state, **seen)) is OK
 
 
@@ -185,7 +185,7 @@ def test_a_damped_arm_has_a_grace_period_for_energy():
 
 @pytest.mark.parametrize(("joint", "sense"), [(1, -1.0), (4, 1.0), (7, 1.0)])
 def test_joints_at_rest_at_activation_are_judged_at_once(joint, sense):
-    """What comes into hold in motion is given time to settle."""
+    """An arm that enters hold in motion is given time to settle."""
     at_limit, beyond = (
         {"qd": fast(joint, sense * (LIMITS.hold_speed[joint - 1] + more))}
         for more in (0.0, E)
@@ -208,7 +208,7 @@ def test_an_arm_entering_hold_may_gain_only_the_energy_limit():
     assert verdict.detail.limit == pytest.approx(limit)
 
 
-def test_an_old_activation_has_no_grace():
+def test_the_speed_limit_of_the_activation_ends_with_it():
     begin = motion(0, HOLD)
     again = motion(LATER, HOLD, **foot(1.01 * LIMITS.activation_speed))
     assert judge(begin, again) is OK
@@ -218,6 +218,6 @@ def test_energy_delayed_by_the_velocity_filter_counts_as_initial():
     before = motion(LATER, ArmState.HOLD)
     early = [before, motion(LATER + 2, ArmState.DAMP, energy=0.10)]
     late = motion(LATER + 100, ArmState.DAMP, energy=0.12)
-    for at in (LATER + 10, LATER + 12):  # 8 and 10 ms after damping was asked for
+    for at in (LATER + 10, LATER + 12):  # 8 and 10 ms after damping was requested
         assert judge(*early, motion(at, ArmState.DAMP, energy=0.30), late) is OK
     assert judge(*early, motion(LATER + 14, ArmState.DAMP, energy=0.30), late) is not OK

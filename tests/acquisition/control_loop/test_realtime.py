@@ -43,7 +43,7 @@ def test_every_enabled_option_is_requested(granting):
     assert parameter.sched_priority == 80
 
 
-def test_no_enabled_option_requests_nothing(granting):
+def test_without_an_enabled_option_nothing_is_requested(granting):
     assert request(RealtimeRequest()) == []
     assert granting == []
 

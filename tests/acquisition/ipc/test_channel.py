@@ -8,19 +8,19 @@ from acquisition.ipc.channel import LARGEST, Channel, ChannelClosedError
 
 @pytest.fixture
 def ends():
-    one, other = Channel.pair()
-    yield one, other
-    one.close()
-    other.close()
+    first, second = Channel.pair()
+    yield first, second
+    first.close()
+    second.close()
 
 
 def test_a_closed_channel_is_reported(ends):
-    one, other = ends
-    other.close()
+    first, second = ends
+    second.close()
     with pytest.raises(ChannelClosedError):
-        one.receive()
+        first.receive()
     with pytest.raises(ChannelClosedError):
-        one.send("x")
+        first.send("x")
 
 
 @pytest.mark.parametrize(
@@ -32,20 +32,20 @@ def test_a_closed_channel_is_reported(ends):
     ],
 )
 def test_invalid_data_close_the_channel(raw):
-    one, other = socket.socketpair()
-    with one, other:
-        one.sendall(raw)
-        one.shutdown(socket.SHUT_WR)
+    first, second = socket.socketpair()
+    with first, second:
+        first.sendall(raw)
+        first.shutdown(socket.SHUT_WR)
         with pytest.raises(ChannelClosedError):
-            Channel(other).receive()
+            Channel(second).receive()
 
 
 def test_large_values_are_carried_whole(ends):
     import threading
 
-    one, other = ends
+    first, second = ends
     value = "x" * 3_000_000
-    sender = threading.Thread(target=one.send, args=(value,))
+    sender = threading.Thread(target=first.send, args=(value,))
     sender.start()
-    assert other.receive() == value
+    assert second.receive() == value
     sender.join()

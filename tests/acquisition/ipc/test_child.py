@@ -1,4 +1,4 @@
-"""Real children, for a fraction of a second each."""
+"""A child process answers requests, passes on its errors and ends on request."""
 
 import os
 import signal
@@ -58,7 +58,7 @@ def refuse():
 
 
 def answering(context):
-    """Be a child that answers until the console hangs up."""
+    """Answer requests until the console hangs up."""
     dispatcher = Dispatcher(
         {
             AddNumbers: lambda a, b: a + b,
@@ -75,14 +75,14 @@ def answering(context):
 
 
 def descriptors():
-    """Return what the open descriptors are of; the listing's own is gone by then."""
-    found = []
+    """Return the targets of the open descriptors, without the listing's own."""
+    paths = []
     for path in list(Path("/proc/self/fd").iterdir()):
         try:
-            found.append(str(path.readlink()).split(":")[0])
+            paths.append(str(path.readlink()).split(":")[0])
         except OSError:
             continue
-    return sorted(found)
+    return sorted(paths)
 
 
 def failing(context):
@@ -129,7 +129,7 @@ def test_the_memory_is_shared(child, shared):
 
 def test_a_child_inherits_nothing_but_what_it_needs(child):
     # stdin and stdout; the shared memory (a mapping keeps one of its own) and the last
-    # words; the channel
+    # output; the channel
     expected = ["/dev/null"] * 2 + ["/memfd"] * 3 + ["socket"]
     assert child.ask(AskDescriptors()) == expected
     assert child.ask(IsSessionLeader())

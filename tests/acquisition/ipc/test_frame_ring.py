@@ -23,9 +23,9 @@ def clock_at(t_ns):
     return clock
 
 
-def tape_of(buffer, times_ns):
-    tape = FrameRing(buffer, clock_at(0))
-    tape.add((1, b"", t_ns) for t_ns in times_ns)
+def fill_ring(buffer, times_ns):
+    ring = FrameRing(buffer, clock_at(0))
+    ring.add((1, b"", t_ns) for t_ns in times_ns)
 
 
 def times(frames):
@@ -33,16 +33,16 @@ def times(frames):
 
 
 def test_the_default_span_is_returned(buffer):
-    tape_of(buffer, (0, S, 3 * S - 1, 3 * S, 5 * S))
+    fill_ring(buffer, (0, S, 3 * S - 1, 3 * S, 5 * S))
     assert times(last_frames(buffer)) == [3 * S, 5 * S]
 
 
 def test_the_span_can_be_chosen(buffer):
-    tape_of(buffer, (0, S, 2 * S))
+    fill_ring(buffer, (0, S, 2 * S))
     assert times(last_frames(buffer, 1.0)) == [S, 2 * S]
 
 
-def test_a_frame_has_its_own_time_or_the_present_in_arrival_order(buffer):
+def test_frames_without_a_time_get_the_present_in_arrival_order(buffer):
     frames = [(0x423, b"\x01\x02\x03", S - 9), (0x443, b"", 0), (1, bytes(8), 8)]
     FrameRing(buffer, clock_at(S)).add(frames)
     kept = buffer.last(5)
@@ -56,7 +56,7 @@ def test_an_empty_ring_gives_no_frames(buffer):
 
 
 def test_the_ring_does_not_grow(buffer):
-    tape_of(buffer, range(50))
+    fill_ring(buffer, range(50))
     assert times(last_frames(buffer)) == [45, 46, 47, 48, 49]
 
 
@@ -71,13 +71,13 @@ def frames_of(*frames):
     buffer = RingBuffer(
         memoryview(bytearray(RingBuffer.size_of(FRAME_DTYPE, 9))), FRAME_DTYPE, 9
     )
-    tape = FrameRing(buffer, clock_at(0))
-    tape.add((can_id, data, t_ns) for t_ns, can_id, data in frames)
+    ring = FrameRing(buffer, clock_at(0))
+    ring.add((can_id, data, t_ns) for t_ns, can_id, data in frames)
     return buffer.last(9)
 
 
 @pytest.mark.parametrize("size", range(9))
-def test_a_frame_is_sixteen_bytes_as_linux_has_it(size):
+def test_a_frame_has_the_can_layout_of_linux(size):
     data = bytes(range(1, size + 1))
     payload = encode_can_batch(0, frames_of((7, 0x403, data)))
     batch = decode("traction_msgs/msg/CanBatch", payload)
@@ -96,6 +96,6 @@ def test_frames_and_times_go_together():
     assert batch.header.frame_id == "can"
 
 
-def test_a_batch_without_frames_is_a_message_too():
+def test_a_batch_without_frames_is_a_valid_message():
     batch = decode("traction_msgs/msg/CanBatch", encode_can_batch(0, frames_of()))
     assert (len(batch.t_ns), len(batch.frames)) == (0, 0)

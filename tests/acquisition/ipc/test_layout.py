@@ -14,15 +14,15 @@ SHARED = SharedLayout.create()
 
 
 def test_two_mappings_of_the_same_memory_agree():
-    one = SharedLayout.create()
-    other = SharedLayout(SharedMemory(one.memory.descriptor))
+    first = SharedLayout.create()
+    second = SharedLayout(SharedMemory(first.memory.descriptor))
     payload = (bytes(range(256)) * 3)[: CYCLE.size]
-    one.cycles.write(payload)
-    one.status.write(b"fine")
-    one.heartbeats.beat(ProcessRole.READER, 7)
-    assert other.cycles.last(1).tobytes() == payload
-    assert other.status.read() == b"fine"
-    assert other.heartbeats.last_ns(ProcessRole.READER) == 7
+    first.cycles.write(payload)
+    first.status.write(b"fine")
+    first.heartbeats.beat(ProcessRole.READER, 7)
+    assert second.cycles.last(1).tobytes() == payload
+    assert second.status.read() == b"fine"
+    assert second.heartbeats.last_ns(ProcessRole.READER) == 7
 
 
 def test_areas_do_not_overlap():
@@ -64,6 +64,6 @@ def test_a_sample_round_trips_through_the_ring(
     assert unpack_wrenches(buffer.last(1)) == [sample]
 
 
-def test_the_memory_has_no_name_to_leave_behind():
+def test_the_shared_memory_is_anonymous():
     descriptor = SHARED.memory.descriptor
     assert "memfd" in str(Path(f"/proc/self/fd/{descriptor}").readlink())

@@ -19,7 +19,7 @@ from fakes.clock import SteppedClock
 STOPPED = verdict_for(Fault.FT_STALE, ForceAge(26.0, 20.0))
 
 
-class Room:
+class ClientBench:
     """A client whose loop obeys every command, or none."""
 
     def __init__(self):
@@ -29,10 +29,10 @@ class Room:
         self.status = LoopStatus(is_running=True)
         self.is_obeying = True
         self.passed = []
-        self.loop_client = LoopClient(self.shared, self.clock, self.let_pass)
+        self.loop_client = LoopClient(self.shared, self.clock, self.run_loop)
         self.commands = []
 
-    def let_pass(self, cycles):
+    def run_loop(self, cycles):
         self.passed.append(cycles)
         self.clock.sleep_until(self.clock.now_ns() + cycles * PERIOD_NS)
         if not self.is_obeying:
@@ -46,63 +46,63 @@ class Room:
 
 
 @pytest.fixture
-def room():
-    return Room()
+def bench():
+    return ClientBench()
 
 
-def test_time_passes_in_slices_with_a_console_heartbeat_in_each(room):
-    room.loop_client.advance(0.05)
-    assert room.passed == [10, 10, 5]
-    beat_ns = room.shared.heartbeats.last_ns(ProcessRole.CONSOLE)
-    assert beat_ns == room.clock.now_ns() - 5 * PERIOD_NS
+def test_time_passes_in_slices_with_a_console_heartbeat_in_each(bench):
+    bench.loop_client.advance(0.05)
+    assert bench.passed == [10, 10, 5]
+    beat_ns = bench.shared.heartbeats.last_ns(ProcessRole.CONSOLE)
+    assert beat_ns == bench.clock.now_ns() - 5 * PERIOD_NS
 
 
-def test_at_least_one_cycle_passes(room):
-    room.loop_client.advance(0.0)
-    assert room.passed == [1]
+def test_at_least_one_cycle_passes(bench):
+    bench.loop_client.advance(0.0)
+    assert bench.passed == [1]
 
 
-def test_a_requested_state_is_reported(room):
-    room.loop_client.request(ArmState.FLOAT)
-    room.loop_client.advance(0.02)
-    assert room.loop_client.status.state is ArmState.FLOAT
+def test_a_requested_state_is_reported(bench):
+    bench.loop_client.request(ArmState.FLOAT)
+    bench.loop_client.advance(0.02)
+    assert bench.loop_client.status.state is ArmState.FLOAT
 
 
-def test_a_verdict_from_before_the_request_is_ignored(room):
-    room.status.control = ControlStatus(ArmState.HOLD, verdict=STOPPED)
-    room.loop_client.advance(0.02)
-    assert room.loop_client.status.verdict == STOPPED
-    room.is_obeying = False
-    room.loop_client.request(ArmState.HOLD)
-    room.loop_client.advance(0.02)
-    assert room.loop_client.status.verdict is None
+def test_a_verdict_from_before_the_request_is_ignored(bench):
+    bench.status.control = ControlStatus(ArmState.HOLD, verdict=STOPPED)
+    bench.loop_client.advance(0.02)
+    assert bench.loop_client.status.verdict == STOPPED
+    bench.is_obeying = False
+    bench.loop_client.request(ArmState.HOLD)
+    bench.loop_client.advance(0.02)
+    assert bench.loop_client.status.verdict is None
 
 
-def test_idle_is_confirmed_by_the_loop(room):
-    assert room.loop_client.idle()
-    assert room.loop_client.status.state is ArmState.IDLE
+def test_idle_is_confirmed_by_the_loop(bench):
+    assert bench.loop_client.idle()
+    assert bench.loop_client.status.state is ArmState.IDLE
 
 
-def test_idle_without_a_reply_is_not_confirmed(room):
-    room.status.control = ControlStatus(ArmState.FLOAT)
-    room.loop_client.advance(0.02)
-    room.is_obeying = False
-    start_ns = room.clock.now_ns()
-    assert not room.loop_client.idle(0.5)
-    # One portion of 20 ms more than asked for at most.
-    assert room.clock.now_ns() - start_ns <= 520_000_000
+def test_idle_without_a_reply_is_not_confirmed(bench):
+    bench.status.control = ControlStatus(ArmState.FLOAT)
+    bench.loop_client.advance(0.02)
+    bench.is_obeying = False
+    start_ns = bench.clock.now_ns()
+    assert not bench.loop_client.idle(0.5)
+    # At most one slice of 20 ms more than requested.
+    assert bench.clock.now_ns() - start_ns <= 520_000_000
 
 
-def test_observers_run_after_every_slice(room):
-    looks = []
-    room.loop_client.on_tick.append(lambda: looks.append(room.clock.now_ns()))
-    room.loop_client.advance(0.04)
-    assert len(looks) == 2
+def test_observers_run_after_every_slice(bench):
+    times = []
+    bench.loop_client.on_tick.append(lambda: times.append(bench.clock.now_ns()))
+    bench.loop_client.advance(0.04)
+    assert len(times) == 2
 
 
-def test_goals_and_biases_are_posted_as_given(room):
-    room.loop_client.move_to(np.arange(7.0), 0.25)
-    room.loop_client.set_bias([1, 2, 3, 4, 5, 6])
-    room.loop_client.advance(0.02)
-    assert room.commands[0] == MoveJoints((0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0), 0.25)
-    assert room.commands[1] == SetBias((1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
+def test_goals_and_biases_are_posted_as_given(bench):
+    bench.loop_client.move_to(np.arange(7.0), 0.25)
+    bench.loop_client.set_bias([1, 2, 3, 4, 5, 6])
+    bench.loop_client.advance(0.02)
+    assert bench.commands[0] == MoveJoints((0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0), 0.25)
+    assert bench.commands[1] == SetBias((1.0, 2.0, 3.0, 4.0, 5.0, 6.0))

@@ -28,7 +28,7 @@ GOAL = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
 
 
 class Cycle:
-    """Notes what it is asked for."""
+    """Keeps every request."""
 
     def __init__(self):
         self.status = ControlStatus()
@@ -66,7 +66,7 @@ class Arm:
 
 
 class Loop:
-    """An attendant whose periods pass when told; the console beats unless silent."""
+    """A loop server whose periods run on demand; the console beats unless silent."""
 
     def __init__(self):
         self.shared = SharedLayout.create()

@@ -1,4 +1,4 @@
-"""Shared memory is for machines that keep the order of stores."""
+"""Shared memory needs a processor that keeps the order of stores."""
 
 import os
 import platform

@@ -19,7 +19,7 @@ from acquisition.ipc.requests import Dispatcher, Request, RequestError, ask
 
 
 class Mode(IntEnum):
-    """An enum as devices have them."""
+    """An enum like those of devices."""
 
     IDLE = 1
     ACTIVE = 2
@@ -27,7 +27,7 @@ class Mode(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A value inside another."""
+    """A nested value."""
 
     name: str
     masses: tuple[float, ...]
@@ -35,7 +35,7 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A value with everything that is sent."""
+    """A value with every type that can be sent."""
 
     path: Path
     parts: tuple[Part, ...]
@@ -76,7 +76,7 @@ class Unknown(Request[None]):
 
 
 class Device:
-    """Carries the requests out, and has more than that."""
+    """A device with handlers of requests, and a method that is no request."""
 
     def __init__(self):
         self.pressed = []
@@ -99,7 +99,7 @@ class Device:
         raise self.error
 
     def erase(self):
-        """Be no request."""
+        """No request reaches this."""
         self.pressed.append("erased")
 
 
@@ -156,7 +156,7 @@ def test_paths_and_nested_dataclasses_round_trip(far):
     assert report == Report(path, (Part("foot", (0.1, 0.2)),), Mode.IDLE)
 
 
-def test_a_request_without_an_answer_gives_none(far, device):
+def test_a_request_without_an_answer_returns_none(far, device):
     assert far.ask(Press("idle")) is None
     assert device.pressed == ["idle"]
 
@@ -166,7 +166,7 @@ def test_a_request_is_sent_as_name_and_fields_in_plain_json(far):
     assert far.sent == [["Add", {"a": 1, "b": 2}]]
 
 
-def test_requests_within_one_thread_are_not_sent(device):
+def test_a_request_is_carried_out_without_a_channel(device):
     dispatcher = Dispatcher(device.handlers())
     assert dispatcher.carry_out(Add(1, 2)) == 3
     with pytest.raises(RequestError, match="Unknown"):
@@ -251,8 +251,8 @@ def test_an_error_of_an_unknown_kind_becomes_a_device_fault(device, far):
 @pytest.mark.parametrize("name", ["Path", "Exception", "nothing"])
 def test_a_foreign_error_name_becomes_a_device_fault(name):
     near, far = Channel.pair()
-    told = {"type": name, "message": "m", "hint": "", "arm_state": "", "saved": ""}
-    far.send({"value": None, "error": told})
+    content = {"type": name, "message": "m", "hint": "", "arm_state": "", "saved": ""}
+    far.send({"value": None, "error": content})
     with pytest.raises(DeviceFaultError, match="m"):
         ask(near, Fail())
     near.close()
@@ -265,6 +265,6 @@ def test_a_bug_on_the_other_side_is_not_hidden(device, far):
         far.ask(Fail())
 
 
-def test_two_tables_with_one_name_are_refused(device):
+def test_two_handlers_of_one_request_are_refused(device):
     with pytest.raises(ValueError, match="Add"):
         Dispatcher(device.handlers(), {Add: lambda a, b: a})

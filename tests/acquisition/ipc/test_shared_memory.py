@@ -13,7 +13,7 @@ def resident():
 
 def test_memory_of_deleted_objects_is_returned_to_the_kernel():
     blocks = [bytes(1000) for _ in range(40_000)]
-    blocks, pins = [], blocks[::40]  # what is left keeps the heap from shrinking
+    blocks, pins = [], blocks[::40]  # the remaining blocks keep the heap from shrinking
     held = resident()
     trim_heap()
     assert held - resident() > 20 * MB

@@ -1,4 +1,4 @@
-"""A simulation in another process does what one in this process does."""
+"""A remote simulation has every operation of a local one."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ QUESTIONS = {
 
 
 class Simulation:
-    """Notes what it is asked for; implements `SimulationControl`."""
+    """Keeps every call; implements `SimulationControl`."""
 
     def __init__(self):
         self.done = []
@@ -140,5 +140,5 @@ def test_an_empty_truth_has_no_records(simulation, truth):
     far.far.close()
 
 
-def test_the_devices_of_a_simulation_are_found(far):
+def test_the_devices_of_a_simulation_are_reported(far):
     assert far.ask(AskDevices()).port == "/s"

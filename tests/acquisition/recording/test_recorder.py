@@ -20,8 +20,8 @@ from tests.acquisition.trials import PERIOD_NS, make_cycles, make_header
 MS = 1_000_000
 
 
-class LoopClient:
-    """A recorder, its ring buffer and its clock, with a loop that runs when told."""
+class RecorderBench:
+    """A recorder, its ring buffer and its clock, with a loop that runs on demand."""
 
     def __init__(self, folder):
         self.clock = SteppedClock()
@@ -54,13 +54,13 @@ class LoopClient:
 
 
 @pytest.fixture
-def loop_client(tmp_path):
-    return LoopClient(tmp_path)
+def bench(tmp_path):
+    return RecorderBench(tmp_path)
 
 
 @pytest.fixture
 def flushes(monkeypatch):
-    """Count what is forced to the disk, in records written so far."""
+    """Number of records written at each flush."""
     seen = []
     flush = TrialWriter.flush
 
@@ -72,149 +72,144 @@ def flushes(monkeypatch):
     return seen
 
 
-def test_a_trial_begins_with_its_pre_roll(loop_client):
-    loop_client.run(1200)
-    loop_client.start()
-    loop_client.run(300)
-    loop_client.recorder.finish("end")
-    assert loop_client.numbers() == list(range(700, 1500))
+def test_a_trial_begins_with_its_pre_roll(bench):
+    bench.run(1200)
+    bench.start()
+    bench.run(300)
+    bench.recorder.finish("end")
+    assert bench.numbers() == list(range(700, 1500))
 
 
-def test_a_young_loop_gives_the_pre_roll_it_has(loop_client):
-    loop_client.run(40)
-    loop_client.start()
-    loop_client.run(10)
-    loop_client.recorder.finish("end")
-    assert loop_client.numbers() == list(range(50))
+def test_a_new_loop_has_a_shorter_pre_roll(bench):
+    bench.run(40)
+    bench.start()
+    bench.run(10)
+    bench.recorder.finish("end")
+    assert bench.numbers() == list(range(50))
 
 
-def test_a_second_trial_repeats_only_its_pre_roll(loop_client, tmp_path):
-    loop_client.start()
-    loop_client.run(600)
-    loop_client.recorder.finish("end")
-    loop_client.path = tmp_path / "T02.mcap"
-    loop_client.start()
-    loop_client.run(10)
-    loop_client.recorder.finish("end")
-    assert loop_client.numbers() == list(range(100, 610))
+def test_a_second_trial_repeats_only_its_pre_roll(bench, tmp_path):
+    bench.start()
+    bench.run(600)
+    bench.recorder.finish("end")
+    bench.path = tmp_path / "T02.mcap"
+    bench.start()
+    bench.run(10)
+    bench.recorder.finish("end")
+    assert bench.numbers() == list(range(100, 610))
 
 
-def test_forces_of_the_pre_roll_are_kept_and_older_ones_are_not(loop_client):
-    loop_client.clock.sleep_until(loop_client.clock.now_ns() + 3000 * MS)
-    young, old = loop_client.wrench(999 * MS), loop_client.wrench(1001 * MS)
-    publish([old, young], loop_client.shared.wrenches)
-    loop_client.start()
-    loop_client.run(5)
-    loop_client.recorder.finish("end")
-    assert batches(loop_client) == [[young.t_ns]]
+def test_forces_of_the_pre_roll_are_kept_and_older_ones_are_not(bench):
+    bench.clock.sleep_until(bench.clock.now_ns() + 3000 * MS)
+    young, old = bench.wrench(999 * MS), bench.wrench(1001 * MS)
+    publish([old, young], bench.shared.wrenches)
+    bench.start()
+    bench.run(5)
+    bench.recorder.finish("end")
+    assert batches(bench) == [[young.t_ns]]
 
 
-def test_forces_of_a_fast_sensor_are_all_written(loop_client):
-    loop_client.start()
-    publish([loop_client.wrench() for _ in range(9000)], loop_client.shared.wrenches)
-    loop_client.run(5)
-    loop_client.recorder.finish("end")
-    assert [len(batch) for batch in batches(loop_client)] == [9000]
+def test_forces_of_a_fast_sensor_are_all_written(bench):
+    bench.start()
+    publish([bench.wrench() for _ in range(9000)], bench.shared.wrenches)
+    bench.run(5)
+    bench.recorder.finish("end")
+    assert [len(batch) for batch in batches(bench)] == [9000]
 
 
-def batches(loop_client):
-    found = messages_of(loop_client.path)["/ft/raw"]
+def batches(bench):
+    messages = messages_of(bench.path)["/ft/raw"]
     type_name = "traction_msgs/msg/WrenchBatch"
-    return [decode(type_name, payload).t_ns.tolist() for _, payload in found]
+    return [decode(type_name, payload).t_ns.tolist() for _, payload in messages]
 
 
-def test_draining_writes_what_is_new(loop_client):
-    loop_client.start()
-    loop_client.run(10)
-    loop_client.recorder.drain()
-    loop_client.recorder.drain()
-    loop_client.run(7)
-    verified = loop_client.recorder.finish("end")
+def test_a_drain_writes_only_new_records(bench):
+    bench.start()
+    bench.run(10)
+    bench.recorder.drain()
+    bench.recorder.drain()
+    bench.run(7)
+    verified = bench.recorder.finish("end")
     assert verified.cycles == 17
 
 
-def test_forces_are_written_in_batches(loop_client):
-    loop_client.start()
+def test_forces_are_written_in_batches(bench):
+    bench.start()
     for _ in range(400):
-        loop_client.clock.sleep_until(loop_client.clock.now_ns() + 1_250_000)
-        publish([loop_client.wrench()], loop_client.shared.wrenches)
-    loop_client.run(2)
-    loop_client.recorder.finish("end")
-    assert [len(batch) for batch in batches(loop_client)] == [16] * 25  # at 800 Hz
+        bench.clock.sleep_until(bench.clock.now_ns() + 1_250_000)
+        publish([bench.wrench()], bench.shared.wrenches)
+    bench.run(2)
+    bench.recorder.finish("end")
+    assert [len(batch) for batch in batches(bench)] == [16] * 25  # at 800 Hz
 
 
-def test_draining_without_a_trial_does_nothing(loop_client):
-    loop_client.run(10)
-    loop_client.recorder.drain()
-    assert not loop_client.recorder.is_recording
+def test_draining_without_a_trial_does_nothing(bench):
+    bench.run(10)
+    bench.recorder.drain()
+    assert not bench.recorder.is_recording
 
 
-def test_the_file_is_synced_at_its_period(loop_client, flushes):
-    loop_client.start()
-    loop_client.run(500, drain_every=10)
+def test_the_file_is_synced_at_its_period(bench, flushes):
+    bench.start()
+    bench.run(500, drain_every=10)
     by_time = list(flushes)
-    loop_client.recorder.abandon()
+    bench.recorder.abandon()
     assert by_time == [130, 260, 390]  # first drain at or after 0.25 s: 130 cycles
 
 
-def test_a_fast_drain_does_not_flush_more_often(loop_client, flushes):
-    loop_client.start()
-    loop_client.run(500, drain_every=1)
+def test_a_fast_drain_does_not_flush_more_often(bench, flushes):
+    bench.start()
+    bench.run(500, drain_every=1)
     by_time = list(flushes)
-    loop_client.recorder.abandon()
+    bench.recorder.abandon()
     assert by_time == [125, 250, 375, 500]
 
 
-def test_losses_of_the_ring_are_in_the_result(loop_client):
-    loop_client.start()
-    slots = loop_client.buffer.slots
-    loop_client.run(slots + 99)
-    loop_client.recorder.finish("end")
-    result = TrialReader(loop_client.path).metadata["result"]
+def test_losses_of_the_ring_are_in_the_result(bench):
+    bench.start()
+    slots = bench.buffer.slots
+    bench.run(slots + 99)
+    bench.recorder.finish("end")
+    result = TrialReader(bench.path).metadata["result"]
     assert result["lost_in_ring"] == "100"  # the record being written is not handed out
-    assert loop_client.numbers() == list(range(100, slots + 99))
+    assert bench.numbers() == list(range(100, slots + 99))
 
 
-def test_a_long_wait_before_the_trigger_is_not_a_loss(loop_client):
-    loop_client.run(loop_client.buffer.slots + 200)
-    loop_client.start()
-    loop_client.recorder.drain()
-    loop_client.run(10)
-    loop_client.recorder.finish("end")
-    assert TrialReader(loop_client.path).metadata["result"]["lost_in_ring"] == "0"
+def test_a_long_wait_before_the_trigger_is_not_a_loss(bench):
+    bench.run(bench.buffer.slots + 200)
+    bench.start()
+    bench.recorder.drain()
+    bench.run(10)
+    bench.recorder.finish("end")
+    assert TrialReader(bench.path).metadata["result"]["lost_in_ring"] == "0"
 
 
-def test_raw_frames_are_recorded_when_the_header_asks(loop_client):
-    tape = FrameRing(loop_client.shared.frames, loop_client.clock)
-    now_ns = loop_client.clock.now_ns()
+def test_raw_frames_are_recorded_when_the_header_asks(bench):
+    tape = FrameRing(bench.shared.frames, bench.clock)
+    now_ns = bench.clock.now_ns()
     tape.add([(1, b"", now_ns - 1001 * MS)])
-    loop_client.recorder.start(
-        loop_client.path, replace(make_header(), has_frames=True)
-    )
+    bench.recorder.start(bench.path, replace(make_header(), has_frames=True))
     tape.add([(0x404, b"\x30", 0)])
-    loop_client.run(5)
-    loop_client.recorder.finish("end")
-    ((_, payload),) = messages_of(loop_client.path)["/can/raw"]
+    bench.run(5)
+    bench.recorder.finish("end")
+    ((_, payload),) = messages_of(bench.path)["/can/raw"]
     frames = decode("traction_msgs/msg/CanBatch", payload).frames
     assert frames[:4].view("<u4").tolist() == [0x404]
 
 
-def test_a_drain_is_a_heartbeat_of_the_recorder(loop_client):
-    loop_client.run(10)
-    loop_client.recorder.drain()
-    assert (
-        loop_client.shared.heartbeats.last_ns(ProcessRole.RECORDER)
-        == loop_client.clock.now_ns()
-    )
+def test_a_drain_is_a_heartbeat_of_the_recorder(bench):
+    bench.run(10)
+    bench.recorder.drain()
+    assert bench.shared.heartbeats.last_ns(ProcessRole.RECORDER) == bench.clock.now_ns()
 
 
-def test_events_are_written_while_a_trial_runs(loop_client):
-    loop_client.recorder.event(20, "operator", "before")
-    loop_client.start()
-    loop_client.run(5)
-    loop_client.recorder.event(20, "operator", "during")
-    loop_client.recorder.finish("end")
-    assert TrialReader(loop_client.path).topic_counts()["/events"] == 1
+def test_events_are_written_while_a_trial_runs(bench):
+    bench.recorder.event(20, "operator", "before")
+    bench.start()
+    bench.run(5)
+    bench.recorder.event(20, "operator", "during")
+    bench.recorder.finish("end")
+    assert TrialReader(bench.path).topic_counts()["/events"] == 1
 
 
 def full_disk(monkeypatch):
@@ -224,66 +219,66 @@ def full_disk(monkeypatch):
     monkeypatch.setattr("os.fsync", full)
 
 
-def test_a_write_error_keeps_the_partial_file_and_is_reported(loop_client, monkeypatch):
-    loop_client.start()
-    loop_client.run(100, drain_every=10)
+def test_a_write_error_keeps_the_partial_file_and_is_reported(bench, monkeypatch):
+    bench.start()
+    bench.run(100, drain_every=10)
     full_disk(monkeypatch)
-    loop_client.run(100, drain_every=10)
-    assert "No space left" in loop_client.recorder.failure.reason
-    assert not loop_client.recorder.is_recording
-    assert not loop_client.path.exists()
-    assert loop_client.path.with_name("T01.mcap.partial").stat().st_size > 0
+    bench.run(100, drain_every=10)
+    assert "No space left" in bench.recorder.failure.reason
+    assert not bench.recorder.is_recording
+    assert not bench.path.exists()
+    assert bench.path.with_name("T01.mcap.partial").stat().st_size > 0
 
 
-def test_a_write_error_at_the_end_keeps_the_partial(loop_client, monkeypatch):
-    loop_client.start()
-    loop_client.run(100)
+def test_a_write_error_at_the_end_keeps_the_partial(bench, monkeypatch):
+    bench.start()
+    bench.run(100)
     full_disk(monkeypatch)
     with pytest.raises(TrialFileError, match="No space left"):
-        loop_client.recorder.finish("end")
-    assert not loop_client.recorder.is_recording
-    assert [p.name for p in loop_client.path.parent.iterdir()] == ["T01.mcap.partial"]
+        bench.recorder.finish("end")
+    assert not bench.recorder.is_recording
+    assert [p.name for p in bench.path.parent.iterdir()] == ["T01.mcap.partial"]
 
 
-def test_a_write_error_in_the_last_drain_ends_the_recording(loop_client, monkeypatch):
-    loop_client.start()
-    loop_client.run(200)  # a quarter of a second has passed: the last drain flushes
+def test_a_write_error_in_the_last_drain_ends_the_recording(bench, monkeypatch):
+    bench.start()
+    bench.run(200)  # a quarter of a second has passed: the last drain flushes
     full_disk(monkeypatch)
     with pytest.raises(TrialFileError):
-        loop_client.recorder.finish("end")
-    assert not loop_client.recorder.is_recording
+        bench.recorder.finish("end")
+    assert not bench.recorder.is_recording
 
 
-def test_a_trial_that_cannot_be_verified_is_not_published(loop_client):
-    loop_client.start()
+def test_a_trial_that_cannot_be_verified_is_not_published(bench):
+    bench.start()
     with pytest.raises(TrialFileError, match="fewer than two"):
-        loop_client.recorder.finish("end")
-    assert [p.name for p in loop_client.path.parent.iterdir()] == ["T01.mcap.partial"]
+        bench.recorder.finish("end")
+    assert [p.name for p in bench.path.parent.iterdir()] == ["T01.mcap.partial"]
 
 
-def test_a_file_that_cannot_be_opened_leaves_the_recorder_idle(loop_client):
-    loop_client.path.write_bytes(b"taken")
+def test_a_file_that_cannot_be_opened_leaves_the_recorder_idle(bench):
+    bench.path.write_bytes(b"taken")
     with pytest.raises(TrialFileError):
-        loop_client.start()
-    assert not loop_client.recorder.is_recording
+        bench.start()
+    assert not bench.recorder.is_recording
 
 
-def test_stopping_without_a_trial_is_an_error_of_the_program(loop_client):
+def test_stopping_without_a_trial_is_an_error_of_the_program(bench):
     with pytest.raises(RuntimeError):
-        loop_client.recorder.finish("end")
+        bench.recorder.finish("end")
 
 
-def test_abandoning_twice_does_nothing(loop_client):
-    loop_client.start()
-    loop_client.recorder.abandon()
-    loop_client.recorder.abandon()
-    assert not loop_client.recorder.is_recording
+def test_abandoning_twice_does_nothing(bench):
+    bench.start()
+    bench.recorder.abandon()
+    bench.recorder.abandon()
+    assert not bench.recorder.is_recording
 
 
-def test_data_from_before_an_abort_are_on_disk(loop_client):
-    loop_client.start()
-    loop_client.run(137)
-    loop_client.recorder.abandon()
-    partial = loop_client.path.with_name(loop_client.path.name + ".partial")
+def test_data_from_before_an_abort_are_on_disk(bench):
+    bench.start()
+    bench.run(137)
+    bench.recorder.abandon()
+    partial = bench.path.with_name(bench.path.name + ".partial")
     saved = recover_file(partial).path
     assert TrialReader(saved).cycles().data["cycle"].tolist() == list(range(137))

@@ -1,4 +1,4 @@
-"""What cannot be looked at now is not taken for what is not there."""
+"""An unreadable folder or lock is not taken for a missing one."""
 
 import errno
 import fcntl
@@ -12,7 +12,7 @@ from acquisition.trial_file.data_files import is_claimed, list_folder
 
 
 def broken(number):
-    """Return a call that a broken disk refuses."""
+    """Return a function that fails with the error `number`."""
 
     def refuse(*_, **__):
         raise OSError(number, os.strerror(number))
@@ -23,8 +23,8 @@ def broken(number):
 def test_a_folder_is_listed_in_order_by_a_pattern(tmp_path):
     for name in ("T02.json", "T01.json", "T01.mcap", ".lock"):
         (tmp_path / name).touch()
-    found = [path.name for path in list_folder(tmp_path, "T??.json")]
-    assert found == ["T01.json", "T02.json"]
+    names = [path.name for path in list_folder(tmp_path, "T??.json")]
+    assert names == ["T01.json", "T02.json"]
     assert len(list_folder(tmp_path)) == 4
     assert list_folder(tmp_path)[0].parent == tmp_path
 
@@ -46,7 +46,7 @@ def test_an_unreadable_folder_is_not_taken_for_an_empty_one(
 
 
 @pytest.mark.parametrize("number", [errno.EIO, errno.EMFILE])
-def test_an_unknown_recorder_state_is_not_guessed(tmp_path, monkeypatch, number):
+def test_an_unreadable_lock_is_reported(tmp_path, monkeypatch, number):
     assert not is_claimed(tmp_path)
     assert not is_claimed(tmp_path / "missing")
     monkeypatch.setattr(os, "open", broken(number))

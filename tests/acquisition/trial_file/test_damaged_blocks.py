@@ -1,4 +1,4 @@
-"""Recordings with damaged blocks: every sound chunk is saved, and the loss is said."""
+"""Recordings with damaged blocks: every sound chunk is recovered, the loss reported."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def recordings(tmp_path_factory):
     return {"T01.mcap": path.read_bytes(), "T01.mcap.partial": partial}
 
 
-def spoilt(data, at, how):
+def with_damaged_blocks(data, at, how):
     """Return `data` with the blocks of numbers `at` damaged."""
     out = bytearray(data)
     for block in at:
@@ -48,7 +48,7 @@ def spoilt(data, at, how):
 
 
 def whole_chunks(data, damaged):
-    """Return which cycles stand in chunks that are as they were, as a mask."""
+    """Return a mask of the cycles in undamaged chunks."""
     found = [s for s in spans(data + bytes(8)) if s.opcode == CHUNK]
     is_sound = np.ones(len(CYCLES), bool)
     for i, span in enumerate(found):
@@ -57,8 +57,8 @@ def whole_chunks(data, damaged):
     return is_sound
 
 
-def hit_descriptions(data, damaged):
-    """Return in which of the two groups of metadata at the head something is hit."""
+def damaged_descriptions(data, damaged):
+    """Return which of the two groups of metadata at the head are damaged."""
     head = span_of(data + bytes(8), CHUNK).start
     found = [s for s in spans(data + bytes(8)) if s.end <= head]
     between = next(s for s in found if s.opcode == ATTACHMENT).start
@@ -71,7 +71,7 @@ def hit_descriptions(data, damaged):
 
 
 def lost_seconds(is_sound):
-    """Return how long the runs of lost cycles are, with the missed ones in them [s]."""
+    """Return the duration of all runs of lost cycles, missed ones included [s]."""
     times = CYCLES["host_ns"].astype(np.int64)
     edges = np.flatnonzero(np.diff(np.concatenate([[1], is_sound, [1]])))
     total = 0
@@ -83,10 +83,10 @@ def lost_seconds(is_sound):
 
 
 def judge(folder, name, data, rng):
-    """Damage, recover and hold against what was sound; whether there is a copy."""
+    """Damage, recover and compare with the sound part; return if there is a copy."""
     blocks = len(data) // BLOCK_BYTES + 1
     at = rng.choice(blocks, rng.integers(1, 6), replace=False)
-    damaged = spoilt(data, at, "zeroed" if rng.integers(2) else "flipped")
+    damaged = with_damaged_blocks(data, at, "zeroed" if rng.integers(2) else "flipped")
     if damaged == data:
         return True
     path = folder / name
@@ -95,8 +95,8 @@ def judge(folder, name, data, rng):
     try:
         recovery = recover_file(path)
     except TrialFileError:
-        # only where what says which trial it is was hit both times
-        assert len(hit_descriptions(data, damaged)) == 2, at
+        # only if both copies of the trial's identity are damaged
+        assert len(damaged_descriptions(data, damaged)) == 2, at
         return False
     reader = TrialReader(recovery.path)
     found = reader.cycles()
@@ -105,7 +105,7 @@ def judge(folder, name, data, rng):
         assert found.data[column].tobytes() == CYCLES[column][is_sound].tobytes()
     assert (found.log_time == CYCLES["host_ns"][is_sound] + OFFSET_NS).all()
     assert verify_file(recovery.path) == recovery.verified
-    if name == "T01.mcap":  # its summary or the heads of its chunks tell
+    if name == "T01.mcap":  # known from its summary or chunk headers
         wanted = lost_seconds(is_sound)
         assert recovery.seconds_dropped == pytest.approx(wanted, abs=0.01), at
     missing = ATTACHMENTS.keys() - reader.attachments.keys()

@@ -1,4 +1,4 @@
-"""Damaged and hostile files: an error with the path in it, at once, or the truth."""
+"""Damaged and hostile files are read correctly or refused with an error naming them."""
 
 import os
 import struct
@@ -57,7 +57,7 @@ def put(tmp_path):
 
 
 def everything(path):
-    """Return what a reader can be asked for."""
+    """Return all cycles, metadata and attachments."""
     reader = TrialReader(path)
     return reader.cycles().data, reader.metadata, reader.attachments
 
@@ -155,7 +155,7 @@ def test_a_flipped_bit_in_the_operators_name_is_detected(put, pristine):
         TrialReader(put(flipped(data, data.index(b"session") + 11)))
 
 
-def test_a_chunk_of_two_to_the_forty_bytes_is_refused(put, pristine):
+def test_a_chunk_with_an_absurd_length_is_refused(put, pristine):
     data = pristine[0]
     at = span_of(data, CHUNK).start + 1
     path = put(resealed(patched(data, at, "<Q", 2**40)))
@@ -163,7 +163,7 @@ def test_a_chunk_of_two_to_the_forty_bytes_is_refused(put, pristine):
         TrialReader(path).cycles()
 
 
-def test_chunk_data_of_two_to_the_forty_bytes_are_refused(put, pristine):
+def test_chunk_data_with_an_absurd_length_are_refused(put, pristine):
     data = pristine[0]
     at = span_of(data, CHUNK).body + 28 + 4 + len(b"zstd")
     path = put(resealed(patched(data, at, "<Q", 2**40)))
@@ -172,7 +172,7 @@ def test_chunk_data_of_two_to_the_forty_bytes_are_refused(put, pristine):
 
 
 @pytest.mark.parametrize("opcode", [METADATA, ATTACHMENT])
-def test_a_record_of_two_to_the_forty_bytes_is_refused(put, pristine, opcode):
+def test_a_record_with_an_absurd_length_is_refused(put, pristine, opcode):
     data = pristine[0]
     at = span_of(data, opcode).start + 1
     with pytest.raises(TrialFileError):
@@ -192,7 +192,7 @@ def test_a_chunk_beyond_the_end_is_refused(put, pristine):
 
 
 def index_tail(data):
-    """Return where the compression name of the first chunk index begins."""
+    """Return the offset of the compression name of the first chunk index."""
     body = span_of(data, CHUNK_INDEX).body
     offsets = struct.unpack_from("<I", data, body + 32)[0]
     return 36 + offsets + 8
@@ -213,7 +213,7 @@ def test_chunks_that_declare_an_absurd_size_are_refused_at_once(put, pristine):
         TrialReader(path)
 
 
-def test_a_message_index_of_two_gigabytes_is_not_read(put, pristine):
+def test_a_message_index_with_an_absurd_length_is_refused(put, pristine):
     data = pristine[0]
     index = next(s for s in spans(data) if s.opcode == INDEX and s.end - s.body > 300)
     path = put(resealed(patched(data, index.body + 2, "<I", 2**31)))
@@ -224,7 +224,7 @@ def test_a_message_index_of_two_gigabytes_is_not_read(put, pristine):
 @pytest.mark.parametrize(
     ("back", "what"), [(8 + 29, "no footer"), (None, "no end of data")]
 )
-def test_section_ends_must_be_in_their_positions(put, pristine, back, what):
+def test_a_file_without_its_footer_or_data_end_is_refused(put, pristine, back, what):
     data = pristine[0]
     at = len(data) - back if back else summary_start(data) - 13
     with pytest.raises(TrialFileError, match=what):
@@ -262,7 +262,7 @@ def test_an_index_outside_its_chunk_is_refused(put, pristine):
         TrialReader(path).cycles()
 
 
-def test_a_billion_announced_messages_are_refused(put, pristine):
+def test_an_absurd_number_of_announced_messages_is_refused(put, pristine):
     data = pristine[0]
     statistics = span_of(data, STATISTICS)
     counts = statistics.body + 8 + 2 + 4 * 4 + 8 + 8 + 4
@@ -332,7 +332,7 @@ def test_fields_in_another_order_are_not_misread(put):
         TrialReader(path).cycles()
 
 
-def test_a_pipe_is_not_waited_for(tmp_path):
+def test_a_pipe_is_refused_without_waiting(tmp_path):
     path = tmp_path / "T.mcap"
     os.mkfifo(path)
     with pytest.raises(TrialFileError, match="is a pipe"):
@@ -341,7 +341,7 @@ def test_a_pipe_is_not_waited_for(tmp_path):
 
 def test_an_oversized_file_is_not_read(put):
     path = put(b"\x89MCAP0\r\n")
-    os.truncate(path, size_limit(path) + 1)  # sparse: takes no room
+    os.truncate(path, size_limit(path) + 1)  # sparse: uses no space
     with pytest.raises(TrialFileError, match=f"{size_limit(path) + 1} bytes"):
         TrialReader(path)
 

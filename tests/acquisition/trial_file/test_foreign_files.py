@@ -1,4 +1,4 @@
-"""MCAP files of other programs are refused with what they hold."""
+"""MCAP files of other programs are refused with a list of their topics."""
 
 import pytest
 from mcap.writer import CompressionType, Writer

@@ -1,4 +1,4 @@
-"""Files that want memory or time get neither; mutated ones are refused or right."""
+"""Hostile files take bounded memory and time; mutated ones are refused or correct."""
 
 import io
 import json
@@ -52,7 +52,7 @@ pages = int(Path("/proc/self/statm").read_text().split()[0])
 limit = pages * resource.getpagesize() + int(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
 for path in map(Path, sys.argv[2:]):
-    said = {"name": path.stem}
+    report = {"name": path.stem}
     for job in (lambda p: TrialReader(p).cycles(), recover_file):
         start = time.process_time()
         try:
@@ -62,8 +62,8 @@ for path in map(Path, sys.argv[2:]):
         else:
             reason = None
         seconds = time.process_time() - start
-        said["recover" if job is recover_file else "read"] = [reason, seconds]
-    print(json.dumps(said))
+        report["recover" if job is recover_file else "read"] = [reason, seconds]
+    print(json.dumps(report))
 """
 
 
@@ -94,7 +94,7 @@ def unsized_frame(window_log):
 
 
 def bombs():
-    """Return name -> (content, pattern of the refusal): few bytes, much inside."""
+    """Return name -> (content, pattern of the refusal) of files that unpack to much."""
     size = len(chunk_content())
     zeros = lz4_zeros(2**30)
     big = padded_content(15 * MIB)
@@ -111,7 +111,7 @@ def bombs():
 
 
 def liars(data):
-    """Return the same for damage and for lengths of a terabyte in `data`."""
+    """Return name -> (content, pattern of the refusal) of damage and false lengths."""
     chunk, metadata = span_of(data, CHUNK), span_of(data, METADATA)
     attachment = span_of(data, ATTACHMENT)
     content = data.index(b"text/plain", attachment.start) + len(b"text/plain")
@@ -145,7 +145,7 @@ def pristine(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def verdicts(tmp_path_factory, pristine):
-    """Return name -> (pattern, what the process with little memory said)."""
+    """Return name -> (pattern, report of the process with little memory)."""
     folder = tmp_path_factory.mktemp("hostile")
     files = bombs() | liars(pristine[0])
     for name, (content, _) in files.items():
@@ -157,8 +157,8 @@ def verdicts(tmp_path_factory, pristine):
         text=True,
         check=True,
     )
-    said = {told["name"]: told for told in map(json.loads, done.stdout.splitlines())}
-    return {name: (pattern, said[name]) for name, (_, pattern) in files.items()}
+    reports = {row["name"]: row for row in map(json.loads, done.stdout.splitlines())}
+    return {name: (pattern, reports[name]) for name, (_, pattern) in files.items()}
 
 
 NAMES = [
@@ -189,8 +189,8 @@ def test_every_hostile_file_has_its_test(verdicts):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_hostile_file_is_refused_for_its_cause_in_bounded_memory(verdicts, name):
-    pattern, said = verdicts[name]
-    reason, seconds = said["read"]
+    pattern, report = verdicts[name]
+    reason, seconds = report["read"]
     assert re.search(pattern, reason or "")
     assert "MemoryError" not in reason
     assert seconds < SECONDS
@@ -206,7 +206,7 @@ def test_recovering_a_hostile_file_takes_bounded_memory(verdicts, name):
 
 
 def everything(path):
-    """Return what a reader can be asked for."""
+    """Return all cycles, metadata and attachments."""
     reader = TrialReader(path)
     rows = reader.cycles()
     columns = (rows.data.tobytes(), rows.log_time.tolist(), rows.sequence.tolist())
@@ -227,7 +227,7 @@ def mutated(data, rng):
 
 
 def forged(data, rng):
-    """Return `data` with some bytes changed and every checksum of a section right."""
+    """Return `data` with some bytes changed and the section checksums recomputed."""
     start = summary_start(data)
     at = int(rng.integers(8 if rng.integers(2) else start, len(data) - 16))
     noise = rng.bytes(int(rng.integers(1, 9)))
@@ -235,7 +235,7 @@ def forged(data, rng):
 
 
 def survey(path, spoil, pristine, rng, count):
-    """Spoil and read `count` times under watch; return how many were refused."""
+    """Spoil and read `count` times in bounded time and memory; return the refusals."""
     data, wanted = pristine
     refused = 0
     tracemalloc.start()
@@ -258,7 +258,7 @@ def survey(path, spoil, pristine, rng, count):
 
 
 def is_recovered(path, wanted):
-    """Recover `path`; whether it gave a trial, a part of the good one in its order."""
+    """Recover `path`; return whether it gave a part of the good trial, in order."""
     target = recovered_path(path)
     target.unlink(missing_ok=True)
     try:
@@ -285,7 +285,7 @@ def is_recovered(path, wanted):
 def test_a_mutated_file_is_refused_or_read_correctly(tmp_path, pristine):
     rng = np.random.default_rng(1)
     refused = survey(tmp_path / "T.mcap", mutated, pristine, rng, 300)
-    assert refused > 290  # next to nothing in the file is without meaning
+    assert refused > 290  # nearly every byte of the file matters
 
 
 def test_a_forged_file_is_refused_or_read_in_bounds(tmp_path, pristine):
@@ -294,7 +294,7 @@ def test_a_forged_file_is_refused_or_read_in_bounds(tmp_path, pristine):
 
 
 def recovered_share(path, pristine, rng, count):
-    """Mutate and recover `count` times; return how many gave a trial."""
+    """Mutate and recover `count` times; return the number of recovered trials."""
     data, wanted = pristine
     recovered = 0
     for _ in range(count):
@@ -307,7 +307,7 @@ def recovered_share(path, pristine, rng, count):
 
 def test_data_recovered_from_a_mutated_file_are_correct(tmp_path, pristine):
     rng = np.random.default_rng(7)
-    # most of the file are chunks, and most of them have one before them
+    # most of the file is chunks, and most of them follow another one
     assert recovered_share(tmp_path / "T.mcap", pristine, rng, 60) > 0.5
 
 

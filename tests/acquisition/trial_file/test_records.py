@@ -27,7 +27,7 @@ def record(opcode, body, length=None):
 
 
 def scanned(folder, data, largest=MIB):
-    """Return the records of a file of `data` until one is damaged, and the damage."""
+    """Return the records of `data` up to the first damaged one, and the damage."""
     path = folder / "log.mcap"
     path.write_bytes(MAGIC + data)
     found = []

@@ -1,4 +1,4 @@
-"""Recovery: every sound record, as a new file, never a traceback."""
+"""Recovery saves every sound record in a new file, or refuses with an error."""
 
 import errno
 import hashlib
@@ -92,9 +92,6 @@ def salvaged_messages(data, path):
     return found, salvage
 
 
-# --- what is saved --------------------------------------------------------------------
-
-
 def test_a_file_cut_in_its_last_chunk_keeps_all_earlier_ones(tmp_path):
     """Three chunks of two cycles each; the last one is cut everywhere."""
     data = partial_bytes(tmp_path, make_cycles(6), block=2)
@@ -160,7 +157,7 @@ def test_a_damaged_chunk_costs_only_itself(put, sealed, cycles):
 
 
 def test_a_chunk_disguised_as_another_record_is_reported_lost(put, sealed):
-    """Or its hole would look like cycles that were missed."""
+    """Otherwise its gap would look like missed cycles."""
     third = chunks(sealed)[2].start
     for opcode in (MESSAGE_INDEX, 1, 0x86, 99):
         data = bytearray(sealed)
@@ -210,7 +207,7 @@ def test_a_duplicated_description_is_copied_once(put, sealed):
 
 
 def test_a_lost_block_at_the_head_loses_no_data(put, sealed):
-    """What says which trial it is stands there a second time."""
+    """The identity of the trial is stored a second time."""
     end = span_of(sealed, ATTACHMENT).start
     recovery = recover_file(put(bytes(end) + sealed[end:], "T01.mcap"))
     whole = TrialReader(put(sealed, "T02.mcap"))
@@ -233,8 +230,8 @@ def test_a_file_without_its_trial_identity_is_refused(put, sealed, reason):
         data = flipped(flipped(sealed, first.body + 3), second.body + 3)
     with pytest.raises(TrialFileError, match=r"nothing to save: it [a-z].+") as refused:
         recover_file(put(data, "T01.mcap"))
-    told = "; what says which trial it is was there" in refused.value.message
-    assert told is bool(reason)
+    is_reported = "; what says which trial it is was there" in refused.value.message
+    assert is_reported is bool(reason)
 
 
 def test_a_lost_summary_loses_nothing_else(put, sealed):
@@ -281,8 +278,7 @@ def test_a_truth_file_without_definitions_is_recognised_by_its_messages(tmp_path
         ((b"key", b"value", b""), False),
     ],
 )
-def test_an_incomplete_description_proves_nothing(tmp_path, texts, is_sound):
-    """What was skipped ends at a description only if that one is whole."""
+def test_a_gap_does_not_end_at_an_incomplete_description(tmp_path, texts, is_sound):
     pairs = b"".join(struct.pack("<I", len(text)) + text for text in texts)
     body = struct.pack("<I", 4) + b"name" + struct.pack("<I", len(pairs)) + pairs
     data = MAGIC_BYTES + b"\xff" * 30 + record(METADATA, body)
@@ -315,7 +311,7 @@ def test_a_zeroed_first_chunk_is_detected_from_the_summary(put, sealed):
     assert recover_file(put(zeroed, "T01.mcap")).losses == (LostSpan(0.0, 0.104),)
 
 
-def test_a_damaged_description_is_doubted(put, sealed):
+def test_a_copy_with_a_damaged_description_is_doubtful(put, sealed):
     at = span_of(sealed, METADATA).end - 3
     recovery = recover_file(put(flipped(sealed, at, 2), "T01.mcap"))
     assert recovery.is_doubtful
@@ -324,9 +320,6 @@ def test_a_damaged_description_is_doubted(put, sealed):
     third = chunks(sealed)[2]
     known = recover_file(put(flipped(sealed, third.body + 90), "T02.mcap"))
     assert not known.is_doubtful
-
-
-# --- what the new file says -----------------------------------------------------------
 
 
 def test_a_recovered_trial_is_readable_and_incomplete(put, left):
@@ -375,12 +368,12 @@ def test_a_message_as_long_as_a_cycle_is_not_counted_as_a_cycle(put, left):
 
 
 def test_losses_are_reported_in_seconds(put, left):
-    """The head of the torn chunk still says how far it went."""
+    """The head of the torn chunk still states its last time."""
     last = chunks(left)[-1]
     recovery = recover_file(put(left[: last.end - 5]))
     # 50 cycles of 2 ms in the lost chunk, none of them missed
     assert recovery.seconds_dropped == pytest.approx(0.1, abs=1e-6)
-    # also where nothing but its head is left: first and last time of 8 bytes each
+    # also if only its head is left: first and last time of 8 bytes each
     recovery = recover_file(put(left[: last.body + 16], "T08.mcap.partial"))
     assert recovery.seconds_dropped == pytest.approx(0.1, abs=1e-6)
 
@@ -412,9 +405,6 @@ def test_a_bad_cadence_does_not_prevent_recovery(tmp_path):
     assert (recovery.verified.cycles, recovery.bytes_dropped) == (100, 0)
 
 
-# --- files ----------------------------------------------------------------------------
-
-
 def test_the_source_is_kept_and_the_copy_is_read_only(put, left):
     path = put(left)
     recovery = recover_file(path)
@@ -435,8 +425,8 @@ def test_a_complete_file_is_reported_complete(put, sealed):
     assert [p.name for p in path.parent.iterdir()] == [path.name]
 
 
-def looks(path):
-    """Return bytes and all that the disk says of a file, but when it was read."""
+def file_state(path):
+    """Return the content of a file with its inode, size, mode and times of change."""
     now = path.stat()
     changed = now.st_mtime_ns, now.st_ctime_ns
     return path.read_bytes(), now.st_ino, now.st_size, now.st_mode, changed
@@ -445,11 +435,11 @@ def looks(path):
 def test_a_second_recovery_reuses_the_first(put, left):
     path = put(left)
     first = recover_file(path)
-    written = looks(first.path)
+    written = file_state(first.path)
     second = recover_file(path)
     assert (first.is_new, second.is_new) == (True, False)
     assert (second.path, second.messages) == (first.path, first.messages)
-    assert looks(first.path) == written
+    assert file_state(first.path) == written
 
 
 def test_another_recovered_file_is_never_overwritten(put, left):
@@ -477,7 +467,7 @@ def test_a_full_disk_leaves_no_half_file(put, left, monkeypatch):
 @pytest.mark.parametrize(
     "data", [b"", b"\x89MCAP0\r\n", b"not a trial at all", bytes(99)]
 )
-def test_an_empty_file_is_refused(put, data):
+def test_a_file_without_records_is_refused(put, data):
     path = put(data)
     with pytest.raises(TrialFileError, match="nothing to save"):
         recover_file(path)
@@ -510,15 +500,12 @@ def test_the_length_of_a_recording_is_read_from_its_chunks(left):
     assert recorded_seconds(b"") == 0.0
 
 
-# --- records that refer to nothing ----------------------------------------------------
-
-
 def record(opcode, body):
     return struct.pack("<BQ", opcode, len(body)) + body
 
 
 def channel_record(number, schema):
-    """Return a channel of a schema that may not be there."""
+    """Return a channel of a schema that may be missing."""
     fields = struct.pack("<HH", number, schema)
     return record(4, fields + struct.pack("<I", 2) + b"/x" + bytes(8))
 
@@ -554,7 +541,7 @@ def chunk_record(content, crc):
 
 
 def kinds_of(data, path):
-    return [type(one).__name__ for one in SoundRecords(data, path)]
+    return [type(record).__name__ for record in SoundRecords(data, path)]
 
 
 def test_after_damage_a_chunk_without_a_checksum_is_not_trusted(tmp_path):
@@ -573,7 +560,7 @@ def test_surplus_bytes_before_a_chunk_cost_no_data(tmp_path, size):
     chunk = chunk_record(content, zlib.crc32(content))
     data = MAGIC_BYTES + b"\xff" * size + chunk
     salvage = SoundRecords(data, tmp_path / "T01.mcap")
-    kinds = [type(one).__name__ for one in salvage]
+    kinds = [type(record).__name__ for record in salvage]
     assert kinds == ["Gap", "Channel", "Message"]
     (gap,) = salvage.gaps
     assert (gap.start, gap.end) == (len(MAGIC_BYTES), len(MAGIC_BYTES) + size)
@@ -581,7 +568,7 @@ def test_surplus_bytes_before_a_chunk_cost_no_data(tmp_path, size):
 
 @pytest.mark.parametrize("is_torn", [False, True])
 def test_channels_are_read_from_beyond_a_premature_data_end(tmp_path, is_torn):
-    """Also from behind one that is all that is left of a head."""
+    """Also if the data end is all that is left of the file's head."""
     content, end = message_record(77), record(15, bytes(4))
     chunk = chunk_record(content, zlib.crc32(content))
     data = end + b"\xff" * 30 + chunk if is_torn else MAGIC_BYTES + chunk + end
@@ -607,7 +594,7 @@ def test_a_definition_quoted_in_an_attachment_is_ignored(tmp_path):
     content = message_record(77)
     data = MAGIC_BYTES + attachment + chunk_record(content, zlib.crc32(content))
     salvage = SoundRecords(data, tmp_path / "T01.mcap")
-    assert [type(one).__name__ for one in salvage] == ["Attachment", "Gap"]
+    assert [type(item).__name__ for item in salvage] == ["Attachment", "Gap"]
     assert "messages without a channel" in salvage.reason
 
 
@@ -678,7 +665,7 @@ def test_topics_are_recognised_by_their_message_sizes(topics):
     assert topics_by_sizes(sizes) == topics
 
 
-def test_messages_of_another_version_are_not_misread():
+def test_messages_of_another_version_are_not_recognised():
     number = list(TRIAL_TOPICS).index("/cycle") + 1
     assert topics_by_sizes({number: CYCLE.size - 4}) == {}
     assert topics_by_sizes({number: CYCLE.size, 40: 8}) == {}

@@ -256,7 +256,7 @@ def test_a_file_left_behind_by_a_kill_asks_for_recovery(tmp_path, cycles):
     assert "traction recover" in caught.value.hint
 
 
-def test_what_was_flushed_survives_a_kill(tmp_path, cycles):
+def test_flushed_data_survive_a_kill(tmp_path, cycles):
     writer = write_trial(tmp_path / "T.mcap", cycles)
     on_disk = writer.partial.read_bytes()
     writer.close_partial()
@@ -319,7 +319,7 @@ def test_a_truth_file_has_no_cycles(tmp_path):
 
 
 def sealed_anyway(tmp_path, cycles, **changes):
-    """Return a finished file whose content verify has to judge."""
+    """Return a finished file that `verify_file` has to judge."""
     writer = write_trial(tmp_path / "T.mcap", cycles, make_header(**changes))
     writer.finish("end")
     return writer
@@ -345,7 +345,7 @@ def test_verify_refuses_cycles_out_of_order(tmp_path):
         verify_file(sealed_anyway(tmp_path, cycles).partial)
 
 
-def test_verify_refuses_a_cycle_that_comes_twice(tmp_path):
+def test_verify_refuses_a_repeated_cycle(tmp_path):
     cycles = make_cycles(50)
     cycles["cycle"][11] = cycles["cycle"][10]
     with pytest.raises(TrialFileError, match="out of order"):
