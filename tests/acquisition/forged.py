@@ -57,7 +57,7 @@ def chunk_content(message=CYCLE.template, compression="zstd"):
 
 
 def with_chunk(payload, size, compression="zstd"):
-    """Return that trial with a chunk of `payload` that declares `size` unpacked bytes."""
+    """Return that trial with a chunk of `payload` that declares a `size` [bytes]."""
     data = one_message(compression)
     chunk = span_of(data, CHUNK)
     name = compression.encode()

@@ -93,7 +93,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             ),
             "",
             (
-                _LOST + "test_a_late_reply_never_answers_the_next_question",
+                _LOST + "test_a_late_reply_is_never_taken_for_the_next_one",
                 "tests/wam/driver/test_late_replies.py::test_permanently_late_replies_are_detected_or_missing",
             ),
         ),

@@ -8,20 +8,20 @@ MS = 1_000_000
 
 
 class Log:
-    """Reads frames that come at given times."""
+    """A bus reader that is fed frames at given times."""
 
     def __init__(self):
         self.reader = BusReader()
-        self.said = []
+        self.lines = []
 
     def __call__(self, at_ns, frame, **kind):
         can_id, _, data = frame.partition(" ")
         logged = LoggedFrame(
             at_ns, 1, "can0", int(can_id, 16), bytes.fromhex(data), **kind
         )
-        spoken = [said.text for said in self.reader.read(logged)]
-        self.said += spoken
-        return spoken[-1]
+        texts = [line.text for line in self.reader.read(logged)]
+        self.lines += texts
+        return texts[-1]
 
 
 @pytest.fixture
@@ -98,7 +98,7 @@ def test_a_puck_that_misses_one_round_is_named(log):
         log(cycle * 2 * MS, "404 30")
         for node in (1, 2, 3, 4, 6, 7) if cycle == 0 else range(1, 8):
             log(cycle * 2 * MS + 300 * US, f"{0x403 + 0x20 * node:x} 00 00 00")
-    assert log.said.count("UNANSWERED puck 5: position") == 1
+    assert log.lines.count("UNANSWERED puck 5: position") == 1
     assert log.reader.tally.unanswered == {"puck 5: position": 1}
     assert log.reader.tally.late == 0
     assert log.reader.finish() == []
@@ -107,9 +107,9 @@ def test_a_puck_that_misses_one_round_is_named(log):
 def test_a_request_expires(log):
     log(0, "00F 05")
     log(999 * MS, "001 05")
-    assert "UNANSWERED node 15: STAT" not in log.said
+    assert "UNANSWERED node 15: STAT" not in log.lines
     log(1000 * MS, "001 44")
-    assert "UNANSWERED node 15: STAT" in log.said
+    assert "UNANSWERED node 15: STAT" in log.lines
 
 
 def test_requests_open_at_the_end_are_reported_with_their_time(log):
@@ -164,8 +164,8 @@ def test_frames_of_other_kinds_are_counted(log):
 
 
 def test_an_error_frame_of_the_controller_is_described(log):
-    said = log(0, "20000204 0020000000008200", is_of_wam=False)
-    assert "the controller reports: passive" in said
+    text = log(0, "20000204 0020000000008200", is_of_wam=False)
+    assert "the controller reports: passive" in text
     assert log.reader.tally.errors == {"passive": 1}
     assert log.reader.tally.foreign == 0
 
@@ -173,7 +173,7 @@ def test_an_error_frame_of_the_controller_is_described(log):
 def test_a_clock_jump_is_reported_and_no_reply_matched_across_it(log):
     log(5000 * MS, "001 05")
     log(1000 * MS, "426 85 00 02 00 00 00")
-    assert "TIME GOES BACK by 4.000 s" in log.said
+    assert "TIME GOES BACK by 4.000 s" in log.lines
     tally = log.reader.tally
     assert (tally.jumps, tally.questions, tally.answers) == (1, 0, 0)
     assert (tally.unsolicited, tally.unanswered.total()) == (1, 0)
@@ -182,6 +182,6 @@ def test_a_clock_jump_is_reported_and_no_reply_matched_across_it(log):
 def test_a_gap_is_reported_and_leaves_its_request_unanswered(log):
     log(1000 * MS, "001 05")
     log(4500 * MS, "001 05")
-    assert log.said[1:3] == ["UNANSWERED puck 1: STAT", "3.500 s without a frame"]
+    assert log.lines[1:3] == ["UNANSWERED puck 1: STAT", "3.500 s without a frame"]
     tally = log.reader.tally
     assert (tally.gaps, tally.longest_gap_ns, tally.jumps) == (1, 3500 * MS, 0)

@@ -1,4 +1,4 @@
-"""Error frames as drivers of Linux send them: classes, counts, what to do about it."""
+"""Error frames of Linux CAN drivers give named errors, counts and a bus condition."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from wam.bus.error_frames import BusErrors, error_names
 
 FLAG = 0x20000000
 
-# (identifier, data, what it reports): as seen from the kernel, and every class alone
+# (identifier, data, reported errors): as seen from the kernel, and every class alone
 FRAMES = [
     (0x20000040, "0000000000000000", {"bus-off"}),
     (0x20000204, "0004000000000061", {"warning"}),
@@ -41,7 +41,7 @@ FRAMES = [
 
 
 @pytest.mark.parametrize(("can_id", "data", "names"), FRAMES)
-@pytest.mark.parametrize("flag", [FLAG, 0])  # python-can takes it away
+@pytest.mark.parametrize("flag", [FLAG, 0])  # python-can removes the flag
 def test_an_error_frame_is_described(can_id, data, names, flag):
     can_id = can_id & ~FLAG | flag
     assert error_names(can_id, bytes.fromhex(data)) == names

@@ -109,7 +109,7 @@ def test_an_extended_identifier_is_not_split():
 
 
 @pytest.mark.parametrize(("number", "data"), GOLDEN_GETS)
-def test_get_is_the_number_alone(number, data):
+def test_a_get_contains_only_the_property_number(number, data):
     assert frames.encode_get(number).hex(" ") == data
 
 
@@ -153,13 +153,13 @@ def test_a_lone_byte_with_its_top_bit_set_is_not_a_request():
 
 
 @given(st.integers(0, 127), int32)
-def test_a_set_arrives_as_it_was_sent(number, value):
+def test_a_set_round_trips(number, value):
     request = frames.decode_request(frames.encode_set(number, value))
     assert request == frames.Property(number, value)
 
 
 @given(st.integers(0, 127))
-def test_a_get_arrives_as_it_was_sent(number):
+def test_a_get_round_trips(number):
     request = frames.decode_request(frames.encode_get(number))
     assert request == frames.Property(number, None)
 
@@ -337,6 +337,6 @@ def test_a_position_from_a_node_that_is_not_a_motor_is_from_a_host(sender):
 def test_frames_of_devices_are_not_attributed_to_a_host():
     replies = [0x426, 0x4E6, 0x506, 0x546, 0x423, 0x4E3, 0x427, 0x50A, 0x50B, 0x50C]
     hand = [frames.position_reply_id(11), frames.property_reply_id(14)]
-    # A node that is not of the arm may be asked who it is; the safety module announces.
+    # A foreign node may be queried; the safety module broadcasts its mode.
     others = [frames.property_reply_id(20), frames.MODE_BROADCAST_ID]
     assert not any(map(frames.is_of_host, [*replies, *hand, *others]))

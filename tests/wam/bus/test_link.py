@@ -14,7 +14,7 @@ from wam.bus.transports import PythonCanTransport, open_bus
 
 
 class ScriptedBus(can.BusABC):
-    """Gives out what it was given; raises where told to."""
+    """A bus that yields scripted messages, or raises a scripted error."""
 
     def __init__(self, messages=(), error=None):
         self.messages = list(messages)
@@ -143,7 +143,7 @@ def test_an_error_found_by_polling_is_raised_to_the_reader():
     bus = ScriptedBus(error=can.CanOperationError("Network is down", errno.ENETDOWN))
     link = opened_link(bus)
     assert not link.is_readable()
-    bus.error = None  # Linux says it once
+    bus.error = None  # Linux reports it once
     with pytest.raises(LinkError, match="Network is down"):
         link.receive()
     assert link.receive() == []
@@ -253,7 +253,7 @@ def test_another_master_with_its_own_node_is_detected(can_id):
 def test_interface_setup_restarts_the_bus_and_queues_one_cycle():
     words = setup_command("can1", 500_000).split()
     assert words[:5] == ["ip", "link", "set", "can1", "up"]
-    kind = words.index("type")  # all that follows is of the controller
+    kind = words.index("type")  # the options of the controller follow
     assert words[5:kind] == ["txqueuelen", "16"]
     assert words[kind:] == [
         *("type", "can", "bitrate", "500000"),

@@ -154,12 +154,12 @@ def test_the_memory_of_a_log_is_bounded():
 
 
 def test_monotonic_times_are_converted_to_utc():
-    class Apart(SteppedClock):
+    class OffsetClock(SteppedClock):
         def utc_ns(self):
             return self.t_ns + KNOWN_NS
 
     sink = Sink()
-    log = CanLog(sink.write, Apart(), "can0")
+    log = CanLog(sink.write, OffsetClock(), "can0")
     log.add(1, b"", 500_000_000)
     log.flush()
     (frame,) = parse_log(sink.text.splitlines(), pytest.fail)

@@ -31,7 +31,7 @@ def can_frame(can_id, data=b"", length=None):
     return struct.pack("=IB3x8s", can_id, len(data) if length is None else length, data)
 
 
-class Apart(SteppedClock):
+class OffsetClock(SteppedClock):
     """A clock whose UTC is a million seconds ahead of its monotonic time."""
 
     def utc_ns(self):
@@ -40,7 +40,7 @@ class Apart(SteppedClock):
 
 @pytest.fixture
 def pair():
-    """A transport, and the far end of the datagrams that it takes for a bus."""
+    """A transport, and the other end of the datagram socket that replaces its bus."""
     near, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
     transport = SocketcanTransport(near, "can0", SteppedClock(), system_call())
     yield transport, far
@@ -63,9 +63,9 @@ def lost(total):
 
 
 class ScriptedCalls:
-    """recvmmsg(2) of a script: (frame, ancillary bytes), errors between them.
+    """Scripted recvmmsg(2): (frame, ancillary bytes), with errors between them.
 
-    It writes what it gives out into the caller's memory, as the kernel does.
+    Writes frames into the caller's memory, as the kernel does.
     """
 
     def __init__(self, *script):
@@ -92,7 +92,7 @@ class ScriptedCalls:
     def _give(header, frame, ancillary):
         fields = struct.unpack("@PIPNPNi0P", ctypes.string_at(header, 56))
         _, _, iovec, _, control, control_room, _ = fields
-        assert control_room == 128  # the last call's sizes are gone
+        assert control_room == 128  # the sizes of the last call are reset
         address, room = struct.unpack("@PN", ctypes.string_at(iovec, 16))
         size = min(len(frame), room)
         ctypes.memmove(address, frame, size)
@@ -122,7 +122,7 @@ class OldSocket:
 
 def scripted(*script, clock=None):
     calls = ScriptedCalls(*script)
-    return SocketcanTransport(OldSocket(), "can0", clock or Apart(), calls)
+    return SocketcanTransport(OldSocket(), "can0", clock or OffsetClock(), calls)
 
 
 def test_sent_frames_have_the_linux_can_layout(pair):
@@ -242,7 +242,7 @@ def test_neither_an_error_nor_the_frames_before_it_are_lost(make):
     with pytest.raises(LinkError, match="Network is down"):
         transport.receive()
     if make == "kernel":
-        assert transport.receive() == []  # Linux says it once
+        assert transport.receive() == []  # Linux reports it once
     else:
         bus.shutdown()
 
@@ -264,7 +264,7 @@ def test_frames_lost_on_the_socket_are_counted():
 
 
 def test_kernel_time_stamps_are_on_the_host_clock():
-    clock = Apart()
+    clock = OffsetClock()
     transport = scripted(
         (can_frame(1), stamps(clock.utc_ns() - 3 * MS)),
         (can_frame(2), b""),
@@ -279,7 +279,7 @@ def test_kernel_time_stamps_are_on_the_host_clock():
 
 
 def test_a_time_stamp_and_a_drop_count_are_read_together():
-    clock = Apart()
+    clock = OffsetClock()
     transport = scripted(
         (can_frame(1), stamps(clock.utc_ns() - 3 * MS) + lost(9)),
         (can_frame(2), lost(11) + stamps(clock.utc_ns() - 2 * MS)),
@@ -312,7 +312,7 @@ def test_more_frames_than_one_call_takes_keep_their_order(pair):
     transport, far = pair
     far.setblocking(False)
     sent = []
-    with contextlib.suppress(BlockingIOError):  # where few may wait
+    with contextlib.suppress(BlockingIOError):  # on systems with a short queue
         for number in range(100):
             far.send(can_frame(0x426, bytes([number])))
             sent.append(number)
@@ -334,7 +334,7 @@ def test_an_error_behind_a_full_call_is_not_lost():
 
 def test_a_call_that_drained_the_socket_is_not_repeated():
     calls = ScriptedCalls(*[(can_frame(i), b"") for i in range(9)])
-    transport = SocketcanTransport(OldSocket(), "can0", Apart(), calls)
+    transport = SocketcanTransport(OldSocket(), "can0", OffsetClock(), calls)
     assert len(transport.receive()) == 9
     assert calls.calls == 1
 
@@ -354,7 +354,7 @@ def test_a_c_library_without_recvmmsg_is_reported(monkeypatch):
 
 
 def test_adapter_time_stamps_keep_the_spacing_of_frames():
-    clock = Apart()
+    clock = OffsetClock()
     utc_ns, own_ns = clock.utc_ns() - 10 * MS, 77 * MS  # it counts from its start
     delays = (900_000, 200_000, 1_500_000, 200_000)
     rows = [
@@ -404,7 +404,7 @@ def test_an_adapter_time_stamp_needs_an_earlier_kernel_time_stamp():
 )
 def test_a_python_can_time_stamp_is_used_if_plausible(stamp, expected_ns):
     transport = PythonCanTransport(
-        ScriptedBus([message(0x426, timestamp=stamp)]), Apart()
+        ScriptedBus([message(0x426, timestamp=stamp)]), OffsetClock()
     )
     (frame,) = transport.receive()
     # A double holds UTC seconds to a quarter of a microsecond.
@@ -422,11 +422,11 @@ def test_a_missing_interface_is_refused(channel):
 
 def test_an_existing_interface_has_a_state():
     name = socket.if_nameindex()[0][1]
-    told = Path("/sys/class/net", name)
-    flags = int((told / "flags").read_text(), 16)
+    sysfs = Path("/sys/class/net", name)
+    flags = int((sysfs / "flags").read_text(), 16)
     state = interface_state(name)
     assert state.is_up == bool(flags & 1)
-    assert state.queue_length == int((told / "tx_queue_len").read_text())
+    assert state.queue_length == int((sysfs / "tx_queue_len").read_text())
 
 
 def test_an_interface_that_is_down_is_not_opened(monkeypatch):

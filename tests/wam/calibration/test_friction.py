@@ -1,4 +1,4 @@
-"""Identification of friction: the way, the reduction, the fit, the file."""
+"""Identification of friction: the path, the reduction, the fit, the file."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -60,7 +60,7 @@ def truth():
 
 
 def rows_of(friction, seed, *, noise=0.02, correlated=False, count=2000):
-    """Return rows as the motors would show them; noise as a share of Coulomb."""
+    """Return simulated rows of all motors; noise as a share of Coulomb friction."""
     rng = np.random.default_rng(seed)
     speed = (
         rng.choice([-1.0, 1.0], (count, 7)) * rng.uniform(0.004, 0.5, (count, 7)) ** 2
@@ -137,7 +137,7 @@ def test_correlated_residuals_within_a_block_widen_the_interval():
         )
         for alike in (True, False)
     )
-    # fifty rows that are alike tell as much as one
+    # fifty equal rows count as one
     assert np.median(wide.asymmetry_deviation / narrow.asymmetry_deviation) > 1.3
 
 
@@ -214,9 +214,11 @@ def test_every_motor_turns_in_both_directions_slowly_and_fast(legs):
     for before, leg in pairwise(legs):
         if leg.use is LegPurpose.TRANSIT:
             continue
-        way = CONSTANTS.j2mp @ (leg.waypoint.q - before.waypoint.q) / TURNS
+        travel = CONSTANTS.j2mp @ (leg.waypoint.q - before.waypoint.q) / TURNS
         rate = (
-            leg.waypoint.speed * way / np.abs(leg.waypoint.q - before.waypoint.q).max()
+            leg.waypoint.speed
+            * travel
+            / np.abs(leg.waypoint.q - before.waypoint.q).max()
         )
         for motor in np.flatnonzero(np.abs(rate) > 1e-9):
             turned.setdefault(int(motor), []).append(float(rate[motor]))
@@ -228,11 +230,13 @@ def test_every_motor_turns_in_both_directions_slowly_and_fast(legs):
 
 
 def test_the_held_out_path_is_not_among_the_fitted_ones(legs):
-    ways = {use: set() for use in LegPurpose}
+    displacements = {use: set() for use in LegPurpose}
     for before, leg in pairwise(legs):
-        ways[leg.use].add(tuple(np.round(leg.waypoint.q - before.waypoint.q, 6)))
-    assert ways[LegPurpose.HELD_OUT]
-    assert not ways[LegPurpose.HELD_OUT] & ways[LegPurpose.FIT]
+        displacements[leg.use].add(
+            tuple(np.round(leg.waypoint.q - before.waypoint.q, 6))
+        )
+    assert displacements[LegPurpose.HELD_OUT]
+    assert not displacements[LegPurpose.HELD_OUT] & displacements[LegPurpose.FIT]
 
 
 def test_a_lack_of_clearance_is_refused(model):
@@ -240,14 +244,14 @@ def test_a_lack_of_clearance_is_refused(model):
         plan_friction(model, np.array(UPRIGHT), FreeSpace(0.62))
 
 
-def leg_of(model, motor_torque, way):
+def leg_of(model, motor_torque, sign):
     """Return a leg at 0.1 rad/s of joint 4 to one side and back."""
     t = np.arange(2000) * 0.002
     shift = 0.1 * np.where(t < 2.0, t, 4.0 - t)
     q = np.array(UPRIGHT) + shift[:, None] * np.eye(7)[3]
     sense = np.where(t < 2.0, 1.0, -1.0)
     tau = np.array([model.gravity(row) for row in q])
-    tau[:, 3] += 18.0 * motor_torque * sense * way
+    tau[:, 3] += 18.0 * motor_torque * sense * sign
     return RecordedLeg(q, tau, 0.1)
 
 
@@ -273,7 +277,7 @@ def test_a_motor_at_rest_gives_no_rows(model):
 
 
 def jumping_leg(model, peak):
-    """Return joint 7 held by friction up to `peak` [N m at the motor], then thrown.
+    """Return a leg of joint 7, stuck up to `peak` [N m at the motor], then thrown.
 
     The torque grows within 80 ms; 40 rad/s^2 for 40 ms follow.
     """

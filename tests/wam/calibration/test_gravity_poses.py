@@ -60,7 +60,7 @@ def test_the_poses_condition_all_gravity_parameters_well(model, count):
     Y = np.vstack([regressor(model.constants, q) for q in poses])
     values = np.linalg.svd(Y, compute_uv=False)
     assert len(poses) == count
-    assert values[0] < 10.0 * values[11]  # twelve directions, none of them faint
+    assert values[0] < 10.0 * values[11]  # twelve directions, none of them weak
 
 
 def test_the_arm_stays_above_the_floor_once_it_has_risen(model, halts):
@@ -69,9 +69,7 @@ def test_the_arm_stays_above_the_floor_once_it_has_risen(model, halts):
         assert lowest_height(model, path).min() > FLOOR - 0.003
 
 
-def test_leaving_and_reaching_the_container_never_goes_below_its_own_height(
-    model, halts
-):
+def test_paths_from_and_to_the_container_stay_above_the_starting_height(model, halts):
     start = lowest_height(model, IN_CONTAINER[None])[0]
     assert start < FLOOR
     for a, b in ((IN_CONTAINER, halts[0].q), (halts[-2].q, halts[-1].q)):
@@ -93,7 +91,7 @@ def test_a_path_that_dips_below_the_floor_leaves_the_workspace(model):
     assert FreeSpace(0.0).is_clear(model, ends[0], ends[1])
 
 
-def test_the_elbow_is_checked_too(model):
+def test_the_lowest_point_may_be_the_elbow(model):
     leaning = np.array([0.0, -1.5, 0.0, 1.6, 0.0, 0.0, 0.0])
     assert model.sole_pose(leaning)[0][2] > 0.3
     assert lowest_height(model, leaning[None])[0] < 0.0
@@ -113,9 +111,9 @@ def test_poses_keep_room_for_their_approach_to_a_stop(model, poses):
 
 @pytest.mark.parametrize("choose", [choose_poses, choose_orientations])
 def test_poses_are_visited_nearest_first(model, choose):
-    way = [np.array(UPRIGHT), *choose(model, 8, SPACE)]
-    for number, (here, there) in enumerate(pairwise(way), 1):
-        left = [float(np.abs(q - here).max()) for q in way[number:]]
+    path = [np.array(UPRIGHT), *choose(model, 8, SPACE)]
+    for number, (here, there) in enumerate(pairwise(path), 1):
+        left = [float(np.abs(q - here).max()) for q in path[number:]]
         assert float(np.abs(there - here).max()) == min(left)
 
 
@@ -142,14 +140,14 @@ def test_each_pose_is_approached_from_below_and_from_above(halts):
         assert {halts[i].speed for i in at} == {APPROACH_SPEED}
 
 
-def test_sole_and_elbow_are_never_faster_than_they_may_be(model, halts):
+def test_the_sole_never_exceeds_its_speed_limit(model, halts):
     here = IN_CONTAINER
     for halt in halts:
         move = JointMove(here, halt.q, halt.speed)
         times = np.linspace(0, move.duration, 200)
         sole = model.sole_path(np.array([move.at(t)[0] for t in times])).position
         speed = np.linalg.norm(np.diff(sole, axis=0), axis=1).max() / times[1]
-        assert speed < 1.05 * POINT_SPEED  # looked at every 0.04 rad
+        assert speed < 1.05 * POINT_SPEED  # sampled every 0.04 rad
         here = halt.q
 
 
@@ -223,8 +221,8 @@ def test_no_pose_is_too_far_from_upright(poses):
     assert (np.ptp(np.array(poses)[:, 1:], axis=0) > 0.5 * REACH[1:]).all()
 
 
-def test_a_pose_without_a_direct_path_is_reached_by_way_of_upright(model):
-    """The way from one side to the other dips; by the upright pose it does not."""
+def test_a_pose_without_a_direct_path_is_reached_through_upright(model):
+    """The direct path dips; the path through the upright pose does not."""
     low, other = (np.array(UPRIGHT) + d for d in ([0] * 7, [0] * 7))
     low[[1, 3]] += (0.9, 0.9)
     other[[1, 3]] += (-0.9, 0.4)
@@ -241,7 +239,7 @@ def test_a_pose_without_a_direct_path_is_reached_by_way_of_upright(model):
 
 
 def test_the_sole_limits_the_speed_of_a_leg(model):
-    """A swing of joint 1 alone: the sole goes on a circle of known radius."""
+    """A swing of joint 1 alone: the sole moves on a circle of known radius."""
     q = np.array([0.0, 1.0, 0.0, 0.3, 0.0, 0.0, 0.0])
     x, y, _ = model.sole_pose(q)[0]
     goal = q.copy()
@@ -272,7 +270,7 @@ def test_a_path_is_no_lower_than_the_floor_or_its_ends(
 
 
 class FarApart:
-    """A clearance in which nothing is near, and something may be on the way."""
+    """A clearance in which nothing is near, with an optional collision on the path."""
 
     def __init__(self, hit=None):
         self.hit = hit
@@ -293,7 +291,7 @@ def test_a_pose_whose_path_dips_is_refused(model, monkeypatch):
         check_poses(model, [np.array(UPRIGHT)], space)
 
 
-def test_a_pose_behind_something_is_refused(model):
+def test_a_pose_with_a_collision_on_its_path_is_refused(model):
     hit = BodyGap("the elbow", "the container", 0.012)
     space = FreeSpace(-5.0, FarApart(hit))
 
@@ -342,8 +340,8 @@ def test_a_turn_of_the_wrist_turns_gravity_across_the_sensor(model, space):
 def test_a_wrist_is_turned_in_the_first_free_direction(model, closed, joint, angle):
     class PartlyClosed(FreeSpace):
         def is_clear(self, model, start, goal):
-            way = goal - start
-            return not any(np.isclose(way[j - 1], by) for j, by in closed)
+            turn = goal - start
+            return not any(np.isclose(turn[j - 1], by) for j, by in closed)
 
     upright, tilted = tilted_pair(model, PartlyClosed(FLOOR))
     turned = np.zeros(7)
@@ -360,12 +358,12 @@ def test_a_wrist_that_cannot_turn_anywhere_is_refused(model):
         tilted_pair(model, Closed(FLOOR))
 
 
-@pytest.mark.parametrize("way", [-1.0, 1.0])
-def test_a_pose_may_be_as_close_to_a_stop_as_its_approach_allows(model, way):
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_pose_may_be_as_close_to_a_stop_as_its_approach_allows(model, side):
     constants, pose = model.constants, np.array(UPRIGHT)
-    stop = constants.q_lower if way < 0.0 else constants.q_upper
-    pose[6] = stop[6] - way * OFFSET
+    stop = constants.q_lower if side < 0.0 else constants.q_upper
+    pose[6] = stop[6] - side * OFFSET
     check_poses(model, [pose], SPACE)
-    pose[6] += way * 1e-9
+    pose[6] += side * 1e-9
     with pytest.raises(SettingsError, match="joint 7 is beyond its stop"):
         check_poses(model, [pose], SPACE)

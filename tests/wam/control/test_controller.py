@@ -66,7 +66,7 @@ def test_the_virtual_mass_is_ramped_out(law, foot_model, state):
         assert np.allclose(gravity, compensation(foot_model, DOWN, mass), atol=1e-12)
 
 
-def test_floating_damps_only_joint_7(law):
+def test_floating_does_not_damp_joints_1_to_6(law):
     law.enter(ArmState.FLOAT, reading(0.0))
     qd = np.full(7, 0.5)
     tau, gravity = law.torque(reading(5.0, qd=qd))
@@ -136,7 +136,7 @@ def test_the_gains_of_the_lock_can_be_chosen(foot_model):
 
 
 def with_walls(foot_model, torque=40.0):
-    """Return a law whose joint 4 stands before its upper wall, which is armed."""
+    """Return a holding law with joint 4 in front of its upper wall, which is armed."""
     constants = foot_model.constants
     walls = Walls(
         tuple(constants.q_lower.tolist()),
@@ -168,7 +168,7 @@ def test_a_wall_pushes_back_in_every_powered_state(foot_model, state):
 
 
 def test_a_wall_torque_is_not_counted_as_gravity(foot_model):
-    # What is cut where a motor is at its limit must never be the weight of the arm.
+    # A limit of torque may cut the push of a wall, but never the weight of the arm.
     law = with_walls(foot_model)
     gravity = law.torque(reading(9.0, q=folded(0.05)))[1]
     assert gravity == pytest.approx(foot_model.gravity(folded(0.05)), abs=1e-12)
@@ -242,8 +242,8 @@ def test_a_powered_test_replaces_gravity_compensation(law):
     law.enter(ArmState.HOLD, reading(0.0))
     law.prove(PUSH, reading(1.0))
     assert law.is_testing()
-    tau, told = law.torque(reading(1.5))
-    assert tau.tolist() == told.tolist() == [0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    tau, gravity = law.torque(reading(1.5))
+    assert tau.tolist() == gravity.tolist() == [0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     law.prove(
         PoweredTestGoal(PoweredTestKind.REST), reading(2.0)
     )  # one after the other
@@ -284,8 +284,8 @@ def test_travel_excess_is_reported_only_in_a_powered_test(law):
     assert law.powered_test_excess(reading(0.5, q=astray), 9.0, is_powered=True) is None
     law.prove(PUSH, reading(1.0))
     assert law.powered_test_excess(reading(1.1), 0.0, is_powered=True) is None
-    told = law.powered_test_excess(reading(1.1, q=astray), 0.0, is_powered=True)
-    assert told.quantity == "the travel of joint 4"
+    excess = law.powered_test_excess(reading(1.1, q=astray), 0.0, is_powered=True)
+    assert excess.quantity == "the travel of joint 4"
     assert law.powered_test_excess(reading(1.1), 9.0, is_powered=True).unit == "J"
     assert (
         law.powered_test_excess(reading(1.2, q=astray), 9.0, is_powered=False) is None
@@ -311,20 +311,20 @@ def test_many_cycles_do_not_grow_memory(foot_model):
 
     for state in (ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP):
         law.enter(state, reading(0.0))
-        compute(50)  # whatever is made once is made now
+        compute(50)  # one-time allocations happen here
         before = sys.getallocatedblocks()
         compute(2000)
         assert sys.getallocatedblocks() - before < 100  # less than one in 20 cycles
 
 
-@pytest.mark.parametrize("way", [1.0, -1.0])
-def test_a_hold_with_weight_stays_within_its_torque_share(foot_model, way):
-    """Joints that carry weight and are braked with all there is, either way."""
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_hold_with_weight_stays_within_its_torque_share(foot_model, side):
+    """Joints that carry weight are braked with full torque in both directions."""
     law = with_walls(foot_model)
     law.enter(ArmState.HOLD, reading(0.0))
-    tau, gravity = law.torque(reading(5.0, qd=np.full(7, -way * 100.0)))
+    tau, gravity = law.torque(reading(5.0, qd=np.full(7, -side * 100.0)))
     assert abs(gravity[1]) > 5.0
-    assert tau[:6] == pytest.approx(np.full(6, way * 0.9 * 40.0))
+    assert tau[:6] == pytest.approx(np.full(6, side * 0.9 * 40.0))
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])

@@ -1,4 +1,4 @@
-"""A share of the dry friction is taken off, and never more than surely is there."""
+"""A share of the dry friction is compensated, never more than its lower bound."""
 
 from dataclasses import replace
 
@@ -48,7 +48,7 @@ def after(compensation, angles, start=0, q=POSE):
     """Return the joint torques after a motor path, shape (n, 7)."""
     cycles = enumerate(angles, start)
     readings = [reading(n, row, q) for n, row in cycles]
-    return np.array([compensation.torque(each, NOTHING) for each in readings])
+    return np.array([compensation.torque(now, NOTHING) for now in readings])
 
 
 def turning(joint, reach, cycles=200):
@@ -59,12 +59,12 @@ def turning(joint, reach, cycles=200):
 
 
 @pytest.mark.parametrize("joint", range(6))
-@pytest.mark.parametrize("way", [1.0, -1.0])
-def test_a_turning_joint_is_compensated_in_the_direction_of_motion(joint, way):
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_turning_joint_is_compensated_in_the_direction_of_motion(joint, sign):
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
-    tau = after(compensation, turning(joint, way * 0.3))[-1]
+    tau = after(compensation, turning(joint, sign * 0.3))[-1]
     whole = joint_coulomb(CONSTANTS, TRUE.coulomb)[joint]
-    assert tau[joint] == pytest.approx(way * 0.7 * whole, rel=1e-3)
+    assert tau[joint] == pytest.approx(sign * 0.7 * whole, rel=1e-3)
 
 
 def test_an_arm_that_never_moved_is_not_compensated():
@@ -146,20 +146,20 @@ def test_friction_that_may_be_zero_is_not_compensated():
 
 @pytest.mark.parametrize("seed", range(8))
 def test_overcompensated_random_motion_never_gains_energy(seed):
-    """Work of compensation and of true friction over ways that end where they began.
+    """The work of compensation and true friction on closed paths is negative.
 
-    The margin is what the compensation's own bristles hold.
+    The margin is the energy stored in the compensation's bristles.
     """
     known = replace(KNOWN, forward=1.2 * TRUE.coulomb, backward=1.2 * TRUE.coulomb)
     compensation = FrictionCompensation(CONSTANTS, known, LARGEST_SHARE)
     random = np.random.default_rng(seed)
     steps = random.normal(size=(3000, 7)).cumsum(axis=0)
     steps *= random.uniform(1e-4, 1e-2) / np.abs(steps).max(axis=0)
-    way = np.concatenate((steps, steps[::-1]))
+    path = np.concatenate((steps, steps[::-1]))
     bristles = BristleFriction(TRUE, np.array(CONSTANTS.drive_inertia), 0.002)
     gained, before = 0.0, np.zeros(7)
-    most = 0.0
-    for number, angles in enumerate(way):
+    largest = 0.0
+    for number, angles in enumerate(path):
         turned = angles - before
         speeds = (turned / 0.002).tolist()
         bristles.take(speeds)
@@ -168,11 +168,11 @@ def test_overcompensated_random_motion_never_gains_energy(seed):
         tau = compensation.torque(reading(number, angles), NOTHING)
         motors = np.linalg.solve(CONSTANTS.j2mp.T, tau)
         gained += float((motors + friction) @ turned)
-        most = max(most, gained)
+        largest = max(largest, gained)
         before = angles
     held = float((0.96 * TRUE.coulomb * 4.0 * TRUE.presliding).sum())
     assert gained <= 0.0
-    assert most <= held
+    assert largest <= held
 
 
 @pytest.mark.parametrize("state", [ArmState.HOLD, ArmState.DAMP, ArmState.IDLE])
@@ -194,22 +194,22 @@ def test_compensation_fades_after_leaving_float(foot_model, state):
     assert np.abs(faded[-1]).max() < 1e-9
 
 
-@pytest.mark.parametrize("way", [-1.0, 1.0])
-def test_fading_compensation_leaves_a_hold_its_torque_limit(foot_model, way):
-    """Joint 1, which bears no weight: nine tenths of 1 N m, less than is pushed."""
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_fading_compensation_leaves_a_hold_its_torque_limit(foot_model, sign):
+    """Joint 1 carries no weight: nine tenths of 1 N m, less than the compensation."""
     walls = Walls(
         tuple(CONSTANTS.q_lower), tuple(CONSTANTS.q_upper), (1.0,) * 7, (0.0,) * 7
     )
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
     law = FootController(foot_model, 0.0, walls=SoftWalls(walls), friction=compensation)
     law.enter(ArmState.FLOAT, reading(0, NOTHING))
-    path = turning(0, way * 0.3)
+    path = turning(0, sign * 0.3)
     for number, angles in enumerate(path):
         tau, gravity = law.torque(reading(number, angles))
-    assert way * (tau - gravity)[0] > 1.0
+    assert sign * (tau - gravity)[0] > 1.0
     law.enter(ArmState.HOLD, reading(200, path[-1]))
     tau, gravity = law.torque(reading(200, path[-1]))
-    assert way * tau[0] == pytest.approx(0.9)
+    assert sign * tau[0] == pytest.approx(0.9)
 
 
 def test_joint_7_is_not_compensated(foot_model):
@@ -258,7 +258,7 @@ def test_shaking_by_hand_does_not_disable_compensation():
     assert compensation.oscillating_motor == 0
 
 
-def test_a_silent_motor_makes_no_step():
+def test_unchanged_counts_cause_no_torque_step():
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
     angles = turning(1, 0.3)
     before = after(compensation, angles)[-1]
@@ -270,42 +270,44 @@ REACH = np.array([4.0, 4.0, 4.0, 4.0, 8.0, 8.0, 8.0]) * 1e-3  # rad of the joint
 
 
 def of_motors(tau):
-    """Return what torques of the joints are at the motors [N m]."""
+    """Return torques of the joints as torques of the motors [N m]."""
     return np.linalg.solve(CONSTANTS.j2mp.T, tau)
 
 
 @pytest.mark.parametrize("motor", range(7))
-@pytest.mark.parametrize("way", [-1.0, 1.0])
-def test_a_bristle_deflects_by_the_motor_travel(motor, way):
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_bristle_deflects_by_the_motor_travel(motor, sign):
     angles = np.zeros((2, 7))
-    angles[1, motor] = way * 0.5 * REACH[motor] * largest_motor_ratios(CONSTANTS)[motor]
+    angles[1, motor] = (
+        sign * 0.5 * REACH[motor] * largest_motor_ratios(CONSTANTS)[motor]
+    )
     tau = after(FrictionCompensation(CONSTANTS, KNOWN, 0.7), angles)[-1]
 
     wanted = np.zeros(7)
-    wanted[motor] = way * 0.5 * 0.7 * TRUE.coulomb[motor]
+    wanted[motor] = sign * 0.5 * 0.7 * TRUE.coulomb[motor]
     counted = (
         2.0 * np.pi / COUNTS[motor] / (REACH * largest_motor_ratios(CONSTANTS))[motor]
     )
     assert of_motors(tau) == pytest.approx(wanted, abs=counted * TRUE.coulomb[motor])
 
 
-@pytest.mark.parametrize("way", [-1.0, 1.0])
-def test_a_motor_jump_deflects_its_bristle_once(way):
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_motor_jump_deflects_its_bristle_once(sign):
     angles = np.zeros((2, 7))
-    angles[1, 1] = way * 3.0 * REACH[1] * largest_motor_ratios(CONSTANTS)[1]
+    angles[1, 1] = sign * 3.0 * REACH[1] * largest_motor_ratios(CONSTANTS)[1]
     tau = after(FrictionCompensation(CONSTANTS, KNOWN, 0.7), angles)[-1]
 
-    assert of_motors(tau)[1] == pytest.approx(way * 0.7 * TRUE.coulomb[1])
+    assert of_motors(tau)[1] == pytest.approx(sign * 0.7 * TRUE.coulomb[1])
 
 
-@pytest.mark.parametrize("way", [-1.0, 1.0])
-def test_each_direction_of_motion_has_its_own_friction(way):
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_each_direction_of_motion_has_its_own_friction(sign):
     known = replace(KNOWN, forward=TRUE.coulomb, backward=0.5 * TRUE.coulomb)
     angles = np.zeros((2, 7))
-    angles[1, 3] = way * 3.0 * REACH[3] * largest_motor_ratios(CONSTANTS)[3]
+    angles[1, 3] = sign * 3.0 * REACH[3] * largest_motor_ratios(CONSTANTS)[3]
     tau = after(FrictionCompensation(CONSTANTS, known, 0.7), angles)[-1]
 
-    share = 0.7 if way > 0.0 else -0.35
+    share = 0.7 if sign > 0.0 else -0.35
     assert of_motors(tau)[3] == pytest.approx(share * TRUE.coulomb[3])
 
 
@@ -376,9 +378,9 @@ def test_uncertainties_are_combined_in_quadrature():
 
 def test_a_far_deflected_bristle_slides_progressively():
     """z grows by the step up to 0.7, and by less and less up to 1."""
-    way = 0.1 * REACH[1] * largest_motor_ratios(CONSTANTS)[1]
+    travel = 0.1 * REACH[1] * largest_motor_ratios(CONSTANTS)[1]
     angles = np.zeros((13, 7))
-    angles[:, 1] = way * np.arange(13)
+    angles[:, 1] = travel * np.arange(13)
     tau = after(FrictionCompensation(CONSTANTS, KNOWN, 0.7), angles)
 
     z = [0.0]
@@ -386,17 +388,17 @@ def test_a_far_deflected_bristle_slides_progressively():
         share = max((z[-1] - 0.7) / 0.3, 0.0)
         z.append(z[-1] + 0.1 * (1.0 - share * z[-1]))
     bent = np.linalg.solve(CONSTANTS.j2mp.T, tau.T)[1] / (0.7 * TRUE.coulomb[1])
-    counted = 0.1 * 2.0 * np.pi / COUNTS[1] / way  # share of a count
+    counted = 0.1 * 2.0 * np.pi / COUNTS[1] / travel  # share of a count
     assert bent == pytest.approx(np.array(z), abs=1.5 * counted)
 
 
-def test_only_both_motors_of_the_differential_release():
-    way = turning(0, 0.3) + turning(1, 0.3) + turning(2, 0.3) + turning(3, 0.3)
-    free = after(FrictionCompensation(CONSTANTS, KNOWN, 0.7), way)[-1]
+def test_a_wall_ends_the_compensation_of_both_motors_of_its_differential():
+    path = turning(0, 0.3) + turning(1, 0.3) + turning(2, 0.3) + turning(3, 0.3)
+    free = after(FrictionCompensation(CONSTANTS, KNOWN, 0.7), path)[-1]
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
-    after(compensation, way)
+    after(compensation, path)
     depth = np.array([0.0, 0.03, 0.0, 0.0, 0.0, 0.0, 0.0])
-    tau = compensation.torque(reading(200, way[-1]), NOTHING, depth)
+    tau = compensation.torque(reading(200, path[-1]), NOTHING, depth)
 
     assert tau[[0, 3]] == pytest.approx(free[[0, 3]])
     assert tau[1:3] == pytest.approx([0.0, 0.0])

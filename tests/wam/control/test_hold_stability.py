@@ -106,7 +106,7 @@ def test_hold_gains_have_a_stability_margin():
 
 
 def growth(kp, kd):
-    """Return how fast the worst motion grows [1/s] with torques a whole cycle late."""
+    """Return the growth rate of the worst motion [1/s], with torques one cycle late."""
     lock = LockGains(kp=kp, kd=kd)
     return max(modes(q, 1.0, lock=lock, delay=1.0).real.max() for q in poses())
 
@@ -120,11 +120,11 @@ def test_every_configurable_lock_is_stable_with_a_cycle_of_delay():
     for stiffness in (0.25 * kp, 0.5 * kp, 0.75 * kp, kp):
         for damping in (LOCK_DAMPING * stiffness, kd):
             assert growth(stiffness, damping) < -1.0
-    assert growth(30.0, 0.25) > 0.0  # what was allowed once
+    assert growth(30.0, 0.25) > 0.0  # allowed in the past
     assert growth(kp, 0.5 * LOCK_DAMPING * kp) > 0.0
 
 
-def test_the_inertia_is_that_of_the_simulated_arm():
+def test_the_inertia_is_positive_and_plausible():
     drives = drive_inertia_matrix(CONSTANTS)
     assert (np.linalg.eigvalsh(inertia(START_Q) - drives) > 0.0).all()
     assert inertia(START_Q)[1, 1] == pytest.approx(2.75, abs=0.1)

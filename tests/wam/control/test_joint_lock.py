@@ -47,7 +47,7 @@ def test_the_torque_is_clipped_at_its_limit(lock, share):
     assert lock.torque(0.4 + error, 0.0, FULL) == pytest.approx(-expected, abs=1e-9)
 
 
-def test_fast_motion_is_clipped_too(lock):
+def test_the_torque_of_fast_motion_is_clipped(lock):
     assert lock.torque(0.4, 1e6, FULL) == -GAINS.limit
 
 
@@ -104,7 +104,7 @@ def test_a_slow_loop_gets_a_softer_lock_with_the_same_damping(lock, periods):
 
 def test_a_lock_released_while_it_grows_fades_from_there(lock):
     lock.release(START + S // 10)
-    # A fifth of the stiffness was there, and it takes a tenth of a second to go.
+    # A fifth of the stiffness was reached, which fades within a tenth of a second.
     at_release = lock.torque(0.41, 0.0, START + S // 10)
     assert at_release == pytest.approx(-0.04, abs=1e-9)
     assert lock.torque(0.41, 0.0, START + 2 * S // 10) == pytest.approx(0.0, abs=1e-9)

@@ -16,9 +16,9 @@ ANGLES = st.lists(st.floats(-2.5, 2.5), min_size=7, max_size=7).map(np.array)
 @given(ANGLES, ANGLES, st.floats(0.1, 2.0), st.floats(0.1, 5.0))
 def test_a_move_starts_and_ends_at_rest_at_its_end_points(start, goal, speed, acc):
     move = JointMove(start, goal, speed, acc)
-    for t, where in ((0.0, start), (move.duration, goal), (1e6, goal)):
+    for t, expected in ((0.0, start), (move.duration, goal), (1e6, goal)):
         q, qd = move.at(t)
-        assert q == pytest.approx(where, abs=1e-9)
+        assert q == pytest.approx(expected, abs=1e-9)
         assert qd == pytest.approx(np.zeros(7), abs=1e-6)
 
 
@@ -43,10 +43,11 @@ def test_velocity_is_the_derivative_of_position(start, goal, share):
 def test_the_path_is_a_straight_line(start, goal, share):
     move = JointMove(start, goal)
     q = move.at(share * move.duration)[0]
-    way, whole = q - start, goal - start
+    travel, whole = q - start, goal - start
     longest = int(np.abs(whole).argmax())
     if abs(whole[longest]) > 1e-6:
-        assert way == pytest.approx(way[longest] / whole[longest] * whole, abs=1e-9)
+        expected = travel[longest] / whole[longest] * whole
+        assert travel == pytest.approx(expected, abs=1e-9)
 
 
 def test_the_duration_of_a_long_move_is_length_over_speed_plus_a_ramp():
@@ -66,7 +67,7 @@ def test_the_pd_part_is_clipped_joint_by_joint():
 
 
 def test_an_obstacle_is_pressed_with_a_bounded_force():
-    """N m beyond the weight: what a person who holds a joint has to bear."""
+    """Torque beyond the weight [N m] on a person who holds a joint."""
     held = joint_pd(np.full(7, 1e6), np.zeros(7), np.ones(7), np.zeros(7))
     assert held.tolist() == [25.0, 20.0, 15.0, 15.0, 5.0, 5.0, 5.0]
 
@@ -100,28 +101,28 @@ def test_a_move_begins_with_its_acceleration():
     assert move.at(-1.0)[0].tolist() == [0.0] * 7
 
 
-@pytest.mark.parametrize("way", [-0.4, 0.4])
-def test_joint_7_turns_at_its_top_speed_once_its_lock_has_released(way):
+@pytest.mark.parametrize("offset", [-0.4, 0.4])
+def test_joint_7_turns_at_its_top_speed_once_its_lock_has_released(offset):
     start, goal = np.full(7, 0.1), np.full(7, 0.1)
-    goal[3], goal[6] = 1.1, 0.1 + way
+    goal[3], goal[6] = 1.1, 0.1 + offset
     move = JointMove(start, goal, 0.2)
     for t in (-1.0, 0.0, 0.5, 0.6, 1.0, 1.37, 1.5, move.duration, 99.0):
         q, qd = move_reference(move, t)
         straight, rates = move.at(t)
         # 0.5 rad/s after a twelfth of a second; 21 mrad of it are lost there.
         ahead = min(max(0.5 * (t - 0.5) - 0.5 / 24.0, 0.0), 0.4)
-        assert q[6] == pytest.approx(0.1 + np.copysign(ahead, way), abs=0.021)
+        assert q[6] == pytest.approx(0.1 + np.copysign(ahead, offset), abs=0.021)
         assert abs(qd[6]) <= 0.5
         assert q[:6].tolist() == straight[:6].tolist()
         assert qd[:6].tolist() == rates[:6].tolist()
-    assert np.sign(move_reference(move, 1.0)[1][6]) == np.sign(way)
+    assert np.sign(move_reference(move, 1.0)[1][6]) == np.sign(offset)
 
 
-@pytest.mark.parametrize("way", [-0.4, 0.4])
-def test_joint_7_reaches_its_top_speed_within_its_ramp(way):
+@pytest.mark.parametrize("offset", [-0.4, 0.4])
+def test_joint_7_reaches_its_top_speed_within_its_ramp(offset):
     goal = np.zeros(7)
-    goal[6] = way
-    side = np.sign(way)
+    goal[6] = offset
+    side = np.sign(offset)
     for after, turned, rate in (
         (-1 / 24, 0.0, 0.0),
         (1 / 24, 0.5 / 96, 0.25),
@@ -134,7 +135,7 @@ def test_joint_7_reaches_its_top_speed_within_its_ramp(way):
         assert (q[6], qd[6]) == pytest.approx((side * turned, side * rate))
 
 
-def test_a_move_without_a_turn_of_joint_7_leaves_it_where_it_is():
+def test_a_move_without_a_turn_of_joint_7_keeps_its_position():
     goal = np.zeros(7)
     goal[3] = 1.0
     assert move_reference(JointMove(np.zeros(7), goal), 0.7)[0][6] == 0.0

@@ -1,4 +1,4 @@
-"""A move that is asked for reaches the law once and bounded; so do reports."""
+"""A requested move reaches the controller once and bounded; so does a report."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ LIMITS = (2.0, 4.5, 1.5, 1.5, 0.25, 0.25, 0.13)  # N m, far below the arm's weig
 
 
 class MovingLaw(Law):
-    """Keeps the moves that it is sent on."""
+    """Records the moves that it is given."""
 
     def __init__(self):
         super().__init__()
@@ -95,19 +95,19 @@ def test_a_move_keeps_a_margin_to_the_torque_limits(foot_model, side):
     tau, _ = law.torque(reading(60.0, q=DOWN - 0.3 * side))  # held back
     assert (np.abs(tau) <= 0.9 * np.array(LIMITS) + 1e-12).all()
     used = np.abs(tau) / np.array(LIMITS)
-    assert (used > 0.899).sum() >= 6  # of joint 2 its weight takes some back
+    assert (used > 0.899).sum() >= 6  # the weight of joint 2 reduces its torque
 
 
 def test_a_move_under_way_gets_gravity_torque_only(foot_model):
-    """Where it should be, as fast as it should be, half-way: no error, no torque."""
+    """An arm on its reference in position and speed gets no torque of the PD."""
     law = FootController(foot_model, 0.0)
     law.enter(ArmState.HOLD, reading(0.0))
     goal = DOWN.copy()
     goal[1] += 0.4
     duration = law.move_to(goal, 0.5, reading(0.0))
-    way = JointMove(DOWN, goal, 0.5)
+    move = JointMove(DOWN, goal, 0.5)
     for share in (0.3, 0.5, 0.9):
-        q, qd = way.at(share * duration)
+        q, qd = move.at(share * duration)
         tau, gravity = law.torque(reading(share * duration, q=q, qd=qd))
         assert tau[:6] == pytest.approx(gravity[:6], abs=1e-3)
 
@@ -115,13 +115,13 @@ def test_a_move_under_way_gets_gravity_torque_only(foot_model):
 STRETCHED = np.array([0.0, 1.2, 0.0, 0.5, 0.0, 0.0, 0.2])
 
 
-@pytest.mark.parametrize("way", [-0.4, 0.4])
-def test_gravity_torque_alone_does_not_flag_a_motor(foot_model, way):
-    """Where the move wants the arm nothing pulls it but its weight, which is borne."""
+@pytest.mark.parametrize("offset", [-0.4, 0.4])
+def test_gravity_torque_alone_does_not_flag_a_motor(foot_model, offset):
+    """On its reference only its weight pulls the arm, and that is compensated."""
     law = FootController(foot_model, 0.0)
     law.enter(ArmState.HOLD, reading(0.0, q=STRETCHED))
     goal = STRETCHED.copy()
-    goal[1] += way
+    goal[1] += offset
     duration = law.move_to(goal, 0.5, reading(0.0, q=STRETCHED))
     for share in (0.0, 0.3, 0.5, 0.9):
         q, qd = JointMove(STRETCHED, goal, 0.5).at(share * duration)
@@ -130,13 +130,13 @@ def test_gravity_torque_alone_does_not_flag_a_motor(foot_model, way):
         assert law.stuck_motor() == 0
 
 
-@pytest.mark.parametrize("way", [-0.4, 0.4])
-def test_a_joint_pulled_by_a_move_beyond_its_weight_is_detected(foot_model, way):
-    """Up and down, as soon as the pull moves it whatever the friction."""
+@pytest.mark.parametrize("offset", [-0.4, 0.4])
+def test_a_joint_pulled_by_a_move_beyond_its_weight_is_detected(foot_model, offset):
+    """Up and down, as soon as the pull exceeds any breakaway torque."""
     law = FootController(foot_model, 0.0)
     law.enter(ArmState.HOLD, reading(0.0, q=STRETCHED))
     goal = STRETCHED.copy()
-    goal[1] += way
+    goal[1] += offset
     law.move_to(goal, 0.5, reading(0.0, q=STRETCHED))
     bound = np.abs(np.linalg.inv(foot_model.constants.j2mp).T) @ BREAKAWAY
     for seconds in np.arange(0.0, 0.4, 0.002):
@@ -147,7 +147,7 @@ def test_a_joint_pulled_by_a_move_beyond_its_weight_is_detected(foot_model, way)
 
 
 def test_a_move_does_not_flag_a_motor_for_an_earlier_move(foot_model):
-    """It begins with the torque of a hold that somebody pushes against."""
+    """The move begins with the torque of a hold that a person pushes against."""
     law = FootController(foot_model, 0.0)
     law.enter(ArmState.HOLD, reading(0.0))
     goal = DOWN.copy()
@@ -175,7 +175,7 @@ def test_a_move_may_end_at_a_joint_stop_but_not_beyond(foot_model, stop):
         law.move_to(goal, 0.5, reading(0.0))
 
 
-def test_no_move_begins_while_a_verdict_stands(bench):
+def test_no_move_begins_while_a_verdict_is_active(bench):
     bench.cycle.report(verdict_for(Fault.CONSOLE_SILENT))
     bench.run()
     bench.cycle.move_to(GOAL, 0.4)

@@ -1,4 +1,4 @@
-"""The springs and dampers of joints that stand still, one by one."""
+"""Springs and dampers hold each joint at rest within its limits."""
 
 import numpy as np
 import pytest

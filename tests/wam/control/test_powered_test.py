@@ -57,7 +57,7 @@ def pushed(kind, joint, sense):
 
 
 def travel_rows():
-    """Return each rule of travel: goal, joint, sense, and how far it may go [rad]."""
+    """Return each rule of travel: goal, joint, sense and limit [rad]."""
     for sense in (-1.0, 1.0):
         yield "rest", REST, 2, sense, LIMITS.rest[1]
         yield "gravity", GRAVITY, 2, sense, LIMITS.gravity * LIMITS.rest[1]
@@ -115,7 +115,7 @@ def test_a_ramp_grows_linearly_until_its_joint_has_moved_forward(sense, joint):
 
 @pytest.mark.parametrize("sense", [-1.0, 1.0])
 def test_a_lift_rises_at_its_speed_pauses_and_returns(sense):
-    """A joint that is where the lift wants it is not pulled; one behind it is."""
+    """A lift pulls a joint behind its reference and none on the reference."""
     proof = PoweredTest(pushed(PoweredTestKind.LIFT, 4, sense), CONSTANTS, reading())
     up_s = LIMITS.lift_travel / LIMITS.lift_speed
     pause_s = 0.3
@@ -156,10 +156,10 @@ def test_a_lift_never_exceeds_its_torque_and_ends_at_zero():
         assert not proof.torque(reading(ms, j4=-0.01), WEIGHT).any()
 
 
-def test_a_ramp_to_zero_torque_gives_none():
+def test_a_ramp_to_zero_torque_has_zero_torque():
     proof = PoweredTest(PoweredTestGoal(PoweredTestKind.RAMP, 2), CONSTANTS, reading())
-    for way in (-0.02, 0.0, 0.02):
-        assert not proof.torque(reading(500, j2=way), WEIGHT).any()
+    for offset in (-0.02, 0.0, 0.02):
+        assert not proof.torque(reading(500, j2=offset), WEIGHT).any()
 
 
 def test_a_lift_is_damped_and_clipped_in_both_directions():
@@ -180,12 +180,12 @@ def test_the_partner_of_a_lifted_joint_is_held_within_its_limit(side, joint, oth
         PoweredTestGoal(PoweredTestKind.LIFT, joint, 1.0), CONSTANTS, reading()
     )
     lifted = {f"j{joint}": 0.08}
-    most = 2.0 * CONSTANTS.coulomb[other - 1]
+    limit = 2.0 * CONSTANTS.coulomb[other - 1]
     far = proof.torque(reading(1700, **lifted, **{f"j{other}": side}), WEIGHT)
-    assert far[other - 1] == pytest.approx(-side * most)
-    near = 0.5 * most / CONSTANTS.kp[other - 1]
+    assert far[other - 1] == pytest.approx(-side * limit)
+    near = 0.5 * limit / CONSTANTS.kp[other - 1]
     kept = proof.torque(reading(1700, **lifted, **{f"j{other}": side * near}), WEIGHT)
-    assert kept[other - 1] == pytest.approx(-side * 0.5 * most)
+    assert kept[other - 1] == pytest.approx(-side * 0.5 * limit)
 
 
 @pytest.mark.parametrize("kind", PoweredTestKind)
@@ -235,7 +235,7 @@ def test_invalid_goals_are_refused(goal):
 
 
 def test_a_goal_is_encoded_with_defaults():
-    """With no joint and no torque, in a second, where nothing else is said."""
+    """No joint, no torque and one second unless given."""
     wanted = [(float(number), 0.0, 0.0, 1.0) for number in range(5)]
     assert [PoweredTestGoal(kind).values for kind in PoweredTestKind] == wanted
 

@@ -32,7 +32,7 @@ def seen(q, qd=STILL, *, is_complete=True):
 
 
 def pushed(walls, q, qd=STILL, tau=STILL):
-    """Return the torques with what the walls add to `tau`."""
+    """Return `tau` plus the torques of the walls."""
     result = np.array(tau, dtype=float)
     walls.apply(result, seen(q, qd))
     return result
@@ -146,8 +146,8 @@ def test_no_trial_of_the_shipped_matrix_touches_a_wall(foot_model):
         q = np.array(row.start_q)
         frame = terrain_frame(row)
         for height in (0.06, 0.0):  # carried to the far end, then pushed across
-            for way in np.linspace(0.0, row.travel, 10):
-                x, y, z = (np.array(frame.far_end) + way * frame.axes()[0]).tolist()
+            for along in np.linspace(0.0, row.travel, 10):
+                x, y, z = (np.array(frame.far_end) + along * frame.axes()[0]).tolist()
                 q = solve_start(
                     foot_model, replace(frame, far_end=(x, y, z)), q, height
                 )
@@ -156,7 +156,7 @@ def test_no_trial_of_the_shipped_matrix_touches_a_wall(foot_model):
 
 
 def test_the_damper_of_a_wall_has_its_configured_gain():
-    """At the stop all of the damper is there, half-way half of it."""
+    """The damper acts fully at the stop, and by half at half the depth."""
     damping, speed = 3.0, -0.4
     walls = SoftWalls(Walls((-1.0,) * 7, (1.0,) * 7, (1e3,) * 7, (damping,) * 7))
     pushed(walls, np.zeros(7))  # armed in the middle

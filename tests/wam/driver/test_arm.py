@@ -47,7 +47,7 @@ def frames(rig):
     return [(can_id, data) for _, can_id, data in rig.sent]
 
 
-def test_an_arm_that_was_used_before_starts_without_waking():
+def test_an_awake_arm_starts_without_waking_its_pucks():
     rig = Rig(counts=HOME_COUNTS)
     arm = WamArm(rig.link, rig.clock)
     info = arm.start()
@@ -85,8 +85,8 @@ def test_the_first_positions_cause_no_speed_fault_of_the_module(vers):
         rig.sent.clear()
         arm.start()
         sent = frames(rig)
-        told = [(i, d) for i, d in enumerate(sent) if d[1][0] == 0x80 | number]
-        (before, five), (after, none) = told
+        writes = [(i, d) for i, d in enumerate(sent) if d[1][0] == 0x80 | number]
+        (before, five), (after, none) = writes
         assert five == (0x00A, bytes((0x80 | number, 0, 5, 0, 0, 0)))
         assert none == (0x00A, bytes((0x80 | number, 0, 0, 0, 0, 0)))
         asked = [i for i, frame in enumerate(sent) if frame == GET_P]
@@ -119,7 +119,7 @@ def test_a_stopped_arm_asks_for_its_release():
     assert "Shift-idle" in caught.value.hint
 
 
-def test_a_missing_safety_module_is_an_error_of_its_own():
+def test_a_missing_safety_module_has_its_own_error():
     rig = Rig()
     rig.network.silence(10)
     with pytest.raises(PreflightError, match="safety module does not answer"):
@@ -206,7 +206,7 @@ def test_replies_before_the_bus_broke_keep_their_time():
 
     def breaking():
         calls.append(rig.clock.t_ns)
-        if len(calls) == 3:  # drained, looked at, and now gone
+        if len(calls) == 3:  # drained, polled, and now gone
             raise LinkError("gone")
         return receive()
 
@@ -393,7 +393,7 @@ def test_safety_mode_is_polled_at_its_period():
     assert arm.safety_mode() is SafetyMode.IDLE
 
 
-def test_activation_is_noticed_within_two_cycles():
+def test_activation_is_noticed_within_a_few_cycles():
     rig, arm = started()
     for _ in range(5):
         cycle(rig, arm, ZERO)
@@ -403,7 +403,7 @@ def test_activation_is_noticed_within_two_cycles():
     assert arm.safety_mode() is SafetyMode.ACTIVE
 
 
-def test_an_e_stop_is_noticed_though_no_torque_is_sent():
+def test_an_e_stop_is_noticed_while_no_torque_is_sent():
     rig, arm = started()
     cycle(rig, arm, ZERO)
     rig.network.pendant("estop")
@@ -413,13 +413,13 @@ def test_an_e_stop_is_noticed_though_no_torque_is_sent():
 
 
 def without_broadcast(rig):
-    """Let the safety module change its mode without a word."""
+    """Suppress the broadcasts of the safety module."""
     due = rig.network.due
     rig.network.due = lambda t_ns: [f for f in due(t_ns) if f[1] != 0x540]
 
 
-def lose_questions(rig, count):
-    """Let the wire swallow the next questions for the safety mode."""
+def lose_mode_requests(rig, count):
+    """Lose the next `count` requests of the safety mode."""
     receive = rig.network.receive
     left = [count]
 
@@ -440,7 +440,7 @@ def test_an_e_stop_is_detected_within_a_few_incomplete_cycles(phase, lost):
     for _ in range(phase):
         cycle(rig, arm, ZERO)
     without_broadcast(rig)
-    lose_questions(rig, lost)
+    lose_mode_requests(rig, lost)
     rig.network.pendant("estop")
     while (reading := arm.read(rig.clock.t_ns)).missing_cycles < 4:
         rig.clock.sleep_until(reading.host_ns + CYCLE_NS)
@@ -524,8 +524,8 @@ def test_idle_on_a_dead_bus_is_unconfirmed_and_does_not_raise():
 def test_positions_are_defined_while_speed_faults_are_ignored():
     rig, arm = started(NetworkOptions(is_zeroed=False), counts=(500,) * 7)
     arm.define_position(HOME)
-    told = [f for f in frames(rig) if len(f[1]) == 6]
-    assert [f"{i:03x} {d.hex(' ')}" for i, d in told] == [
+    writes = [f for f in frames(rig) if len(f[1]) == 6]
+    assert [f"{i:03x} {d.hex(' ')}" for i, d in writes] == [
         "00a b7 00 05 00 00 00",
         "001 b0 00 00 00 00 00",
         "002 b0 00 1f 70 ff ff",
@@ -582,7 +582,7 @@ def test_an_arm_that_is_only_listened_to_is_braked_by_its_own_module():
 
 
 @pytest.mark.parametrize("node", [0, 3, 8, 20, 31])
-def test_another_master_is_reported_whatever_its_node(node):
+def test_another_master_with_any_node_is_reported(node):
     rig, arm = started(NetworkOptions(heartbeat_ns=10_000_000_000))
     rig.network.pendant("activate")
     cycle(rig, arm, TAU)
@@ -618,7 +618,7 @@ def test_zeroing_a_moving_arm_is_refused_with_the_joint(joint, turned, is_taken)
     assert not arm.safety.is_zeroed()
 
 
-def test_a_module_that_says_idle_is_not_believed_against_a_puck():
+def test_a_reported_idle_is_not_believed_against_a_driven_puck():
     rig, arm = started()
     rig.network.pendant("activate")
     for _ in range(40):
@@ -636,7 +636,7 @@ def test_a_module_that_says_idle_is_not_believed_against_a_puck():
     assert arm.safety_mode() is SafetyMode.IDLE
 
 
-def test_a_module_that_says_idle_is_not_believed_while_positions_go_on():
+def test_a_reported_idle_is_not_believed_while_positions_are_requested():
     rig, arm = started()
     rig.network.pendant("activate")
     rig.network.disobey()
@@ -648,7 +648,7 @@ def test_a_module_that_says_idle_is_not_believed_while_positions_go_on():
     assert arm.safety_mode() is not SafetyMode.IDLE
 
 
-def test_without_a_reply_of_its_puck_the_module_decides_idle():
+def test_a_reported_idle_is_believed_if_the_puck_is_silent():
     rig, arm = started()
     rig.network.pendant("activate")
     cycle(rig, arm, TAU)

@@ -1,4 +1,4 @@
-"""Pucks that do not do as they are told, and those that do."""
+"""Pucks that do not obey their commands are reported, obedient ones are not."""
 
 import numpy as np
 import pytest
@@ -12,8 +12,8 @@ from wam.driver.arm import WamArm
 
 HOME_COUNTS = (0, -36833, 36832, -36728, 0, 0, 0)
 CYCLE_NS = 2_000_000
-JOINTS = np.array([1.0, 1.5, 0.8, 0.6, 0.5, 0.2, 0.3])  # N m, no motor without any
-PERIODS = 100  # 0.2 s, within which a contradiction has to be told
+JOINTS = np.array([1.0, 1.5, 0.8, 0.6, 0.5, 0.2, 0.3])  # N m, some for every motor
+PERIODS = 100  # 0.2 s, within which a contradiction has to be reported
 GROUPS = {Group.LOWER_TORQUE: (1, 2, 3, 4), Group.WRIST_TORQUE: (5, 6, 7)}
 
 
@@ -25,15 +25,15 @@ class Driven:
         self.arm = WamArm(self.rig.link, self.rig.clock)
         self.arm.start()
         self.number = 0
-        self.told = None
+        self.disobedience = None
         self.run(20)
         if is_active:
             self.rig.network.pendant("activate")
             self.run(50)
-        assert self.told is None
+        assert self.disobedience is None
 
     def run(self, cycles):
-        """Run until something is told; return after how many cycles."""
+        """Run until a contradiction is reported; return the number of cycles."""
         for cycle in range(cycles):
             self.number += 1
             reading = self.arm.read(self.rig.clock.t_ns)
@@ -42,7 +42,7 @@ class Driven:
                 self.arm.send(share * JOINTS, np.zeros(7))
             self.rig.rest(CYCLE_NS - self.rig.clock.t_ns % CYCLE_NS)
             if reading.disobeys is not None:
-                self.told = reading.disobeys
+                self.disobedience = reading.disobeys
                 return cycle
         return cycles
 
@@ -86,7 +86,7 @@ def test_lost_replies_are_not_reported_as_disobedience(driven):
 def test_a_puck_that_leaves_torque_mode_is_reported(driven, node):
     driven.rig.network.lose_mode(node)
     assert driven.run(PERIODS) < PERIODS
-    assert driven.told == MotorChange(node, "MODE", PuckMode.TORQUE, PuckMode.IDLE)
+    assert driven.disobedience == MotorChange(node, "MODE", PuckMode.TORQUE, PuckMode.IDLE)
 
 
 @pytest.mark.parametrize("group", GROUPS)
@@ -94,9 +94,9 @@ def test_torques_that_reach_no_puck_are_reported(driven, group):
     lost = group_id(group)
     driven.rig.network.faults.lose_from_host(lambda can_id, _: can_id == lost)
     assert driven.run(PERIODS) < PERIODS
-    assert driven.told.name == "T"
-    assert driven.told.motor in GROUPS[group]
-    assert driven.told.value != driven.told.was
+    assert driven.disobedience.name == "T"
+    assert driven.disobedience.motor in GROUPS[group]
+    assert driven.disobedience.value != driven.disobedience.was
 
 
 @pytest.mark.parametrize("node", MOTOR_NODES)
@@ -106,7 +106,7 @@ def test_a_puck_that_missed_idle_is_idled_individually_and_reported(driven, node
     assert driven.arm.idle()
     assert network.driven() == []
     driven.run(1)
-    assert driven.told == MotorChange(node, "MODE", PuckMode.IDLE, PuckMode.TORQUE)
+    assert driven.disobedience == MotorChange(node, "MODE", PuckMode.IDLE, PuckMode.TORQUE)
 
 
 @pytest.mark.parametrize("node", MOTOR_NODES)
@@ -114,7 +114,7 @@ def test_a_puck_that_cannot_be_idled_keeps_its_torque_and_loses_its_power(driven
     network, motors = driven.rig.network, driven.rig.motors
     network.deafen(node)
     network.faults.lose_from_host(
-        lambda can_id, data: can_id == node and len(data) > 1  # what sets, not asks
+        lambda can_id, data: can_id == node and len(data) > 1  # a set, not a request
     )
     pulls = motors.units[node - 1]
     assert not driven.arm.idle()

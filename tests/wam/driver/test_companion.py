@@ -1,4 +1,4 @@
-"""A device that is asked along with the positions, and what it costs the arm."""
+"""A companion device is polled with the positions and does not delay them."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ FORCE, TORQUE = 0x50A, 0x50B
 
 
 class RecordingDevice:
-    """Asks for the wrench and keeps the frames that it is given."""
+    """Requests the wrench and stores the frames that it receives."""
 
     def __init__(self):
         self.asked, self.heard = [], []
@@ -57,11 +57,11 @@ def test_the_companion_is_polled_once_a_cycle_right_after_the_positions(
     assert listener.asked == [begin_ns]
 
 
-def test_the_companion_is_not_waited_for(rig, arm, listener):
+def test_a_reading_does_not_wait_for_the_companion(rig, arm, listener):
     reading = arm.read(rig.clock.t_ns)
     assert reading.is_complete
     assert FORCE not in {can_id for can_id, _ in listener.heard}
-    assert rig.clock.t_ns - reading.host_ns < 800_000  # the torque comes at 0.87 ms
+    assert rig.clock.t_ns - reading.host_ns < 800_000  # the torque arrives at 0.87 ms
 
 
 def test_replies_after_the_positions_are_read_in_the_next_cycle(rig, arm, listener):

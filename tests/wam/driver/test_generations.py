@@ -1,4 +1,4 @@
-"""One contract, run over the fake bus for every generation of firmware."""
+"""Every generation of firmware fulfils one contract on the fake bus."""
 
 import numpy as np
 import pytest
@@ -96,7 +96,7 @@ def test_idle_is_confirmed_before_zero_torque(bench):
     bench.cycle(TAU)
     bench.rig.sent.clear()
     assert bench.arm.idle()
-    # Behind the questions to the module and to the pucks.
+    # After the requests to the module and to the pucks.
     nodes = (0x00A, *MOTOR_NODES)
     order = [(i, d) for _, i, d in bench.rig.sent if i not in nodes]
     assert [decode_torques(data) for _, data in order] == [(0, 0, 0, 0)] * 2
@@ -125,7 +125,7 @@ def test_a_property_is_read_at_the_number_of_its_firmware(vers, ecmax):
     assert properties.get(1, ecmax) == 0
 
 
-def test_pucks_of_two_generations_work_together():
+def test_pucks_of_several_generations_work_together():
     rig = Rig(NetworkOptions(vers=(65, 124, 125, 131, 132, 175, 200)), HOME_COUNTS)
     info = WamArm(rig.link, rig.clock).start()
     assert [p.cts for p in info.pucks] == [4096] * 7
@@ -138,7 +138,7 @@ DOCUMENTED = sorted({40, 175, 174, 200, *BREAKS, *(vers - 1 for vers in BREAKS)}
 # Beginnings and ends of the ranges in which P, T, CTS, IPNM, POLES, PEN keep a number.
 RANGE_ENDS = (40, 44, 49, 50, 60, 61, 63, 64, 65, 200)
 # P and T are numbered alike in 32..49, 50..60 and from 61 on, in hexadecimal:
-QUESTIONS = {40: ("1a", "8a"), 50: ("1a", "89"), 60: ("1a", "89"), 61: ("30", "aa")}
+REQUESTS = {40: ("1a", "8a"), 50: ("1a", "89"), 60: ("1a", "89"), 61: ("30", "aa")}
 
 
 @pytest.mark.parametrize("vers", DOCUMENTED)
@@ -194,7 +194,7 @@ def test_every_firmware_is_polled_for_telemetry(vers):
     assert [(p.motor_degc, p.bus_voltage, p.error) for p in health] == [(33, 41, 0)] * 7
 
 
-@pytest.mark.parametrize(("vers", "bytes_"), QUESTIONS.items())
+@pytest.mark.parametrize(("vers", "bytes_"), REQUESTS.items())
 def test_requests_and_torques_have_the_bytes_of_their_firmware(vers, bytes_):
     bench = Bench(vers, 200)
     bench.arm.start()
@@ -217,7 +217,7 @@ def test_requests_and_torques_have_the_bytes_of_their_firmware(vers, bytes_):
 def test_undocumented_firmware_is_driven_as_the_nearest_with_a_warning(
     motor, safety, who, taken_as
 ):
-    # What the newest and the oldest known do stands for what nobody knows.
+    # Unknown firmware is driven as the newest or the oldest known one.
     bench = Bench(motor, safety)
     (warning,) = bench.arm.start().warnings
     assert f"of {who} is not documented" in warning
@@ -245,6 +245,6 @@ def test_pucks_that_cannot_share_a_torque_frame_are_refused(other):
     assert "P or T" in caught.value.message
 
 
-def test_pucks_of_two_old_generations_work_together():
+def test_pucks_of_several_old_generations_work_together():
     rig = Rig(NetworkOptions(vers=(50, 51, 60, 60, 60, 60, 50)), HOME_COUNTS)
     assert len(WamArm(rig.link, rig.clock).start().pucks) == 7

@@ -14,7 +14,7 @@ NOTED = (1012, 340, 2761, 95, 4001, 1200, 2048)
 
 
 def mech_at(q):
-    """Return MECH of an arm that is `q` [rad] from where NOTED was noted."""
+    """Return MECH of an arm that is `q` [rad] away from the pose of NOTED."""
     counts = np.array(NOTED) + CONSTANTS.j2mp @ q * TURN / (2 * np.pi)
     return [int(c) for c in np.floor(counts + 0.5) % TURN]
 

@@ -1,4 +1,4 @@
-"""Positions and velocities out of replies, some of which are missing or false."""
+"""Positions and velocities are estimated though replies are missing or false."""
 
 import numpy as np
 import pytest
@@ -46,8 +46,8 @@ def test_steady_motion_is_estimated_with_its_velocity(estimator):
     assert estimator.qd7_raw == pytest.approx(rates[6])
 
 
-def test_the_filter_of_velocities_has_its_pole(estimator):
-    """After one cycle the share p T / (1 + p T) of the velocity is seen."""
+def test_the_velocity_filter_has_the_configured_pole(estimator):
+    """After one cycle the output is the share p T / (1 + p T) of the velocity."""
     move(estimator, 1)
     p = ArmSettings().velocity_pole * 0.002
     rates = estimator.transmission.joints([STEP / 0.002] * 7)
@@ -68,7 +68,7 @@ def test_two_reads_at_one_instant_do_not_change_the_velocity(estimator):
 
 
 def test_the_raw_velocity_of_joint_7_uses_replies_and_no_extrapolation(estimator):
-    """What was guessed meanwhile, from a filtered velocity, is no motion."""
+    """Positions extrapolated meanwhile do not count as motion."""
     move(estimator, 1)
     per_count = estimator.transmission.joints([1] * 7)[6]
     first = estimator.qd7_raw
@@ -105,7 +105,7 @@ def test_missing_replies_are_extrapolated_for_a_limited_time(estimator):
     estimator.update(1100 * 2 * MS, none)
     last = estimator.q.copy()
     estimator.update(1200 * 2 * MS, none)
-    assert estimator.q == pytest.approx(last)  # no guess goes on for ever
+    assert estimator.q == pytest.approx(last)  # extrapolation has ended
 
 
 def test_a_rejected_position_is_named_and_moves_no_joint(estimator):
@@ -136,7 +136,7 @@ def test_the_faster_of_two_jumps_is_named(estimator):
 
 @pytest.mark.parametrize(("counts", "is_believed"), [(4, True), (5, False)])
 def test_a_few_counts_of_jitter_are_not_a_jump(counts, is_believed):
-    """Two replies of one instant: whatever the speed limit, no way lies between."""
+    """Two replies at one instant allow no travel, whatever the speed limit."""
     transmission = Transmission(load_constants().j2mp, CTS, IPNM)
     estimator = JointEstimator(transmission, ArmSettings())
     estimator.begin(0, [0] * 7)

@@ -1,4 +1,4 @@
-"""Replies that answer an earlier question look in time, until a cycle does not ask."""
+"""Replies to an earlier request look timely until a cycle sends no request."""
 
 from itertools import pairwise
 
@@ -21,7 +21,7 @@ TORQUES = 0x401
 
 
 class Bench:
-    """An arm that is asked 500 times a second, its replies late from a time on."""
+    """An arm read at 500 Hz whose replies can be delayed."""
 
     def __init__(self, **settings):
         self.rig = Rig(NetworkOptions(heartbeat_ns=10_000_000_000))
@@ -48,7 +48,7 @@ class Bench:
             )
 
 
-def unasked(readings):
+def cycles_without_request(readings):
     return [i for i, reading in enumerate(readings) if reading.is_without_request]
 
 
@@ -69,7 +69,7 @@ def test_permanently_late_replies_are_detected_or_missing(nodes, late_ms):
     readings = bench.run(4 * EVERY)
     late = [r.late for r in readings if r.late is not None]
     motors = sum(1 << (node - 1) for node in nodes)
-    if not late:  # between give-up and the next question: nothing is ever complete
+    if not late:  # between give-up and the next request: no reading is ever complete
         assert max(r.missing_cycles for r in readings) > 3 * EVERY
         return
     assert len(late) >= 3
@@ -86,7 +86,7 @@ def test_no_request_is_skipped_while_positions_are_rejected(before):
     bench.rig.motors.position[2] += 1_000_000
     readings = bench.run(30)
     assert [r.missing_cycles for r in readings] == list(range(1, 31))
-    assert unasked(readings) == []
+    assert cycles_without_request(readings) == []
 
 
 @pytest.mark.parametrize("late_ms", [1.95, 2.0, 2.6, 3.95, 5.9])
@@ -99,10 +99,10 @@ def test_late_replies_look_timely_until_a_request_is_skipped(late_ms):
     assert reading.late is not None
 
 
-def test_a_sound_arm_is_never_late():
+def test_no_reply_of_a_sound_arm_is_late():
     bench = Bench()
     readings = bench.run(10 * EVERY)
-    assert len(unasked(readings)) == 10
+    assert len(cycles_without_request(readings)) == 10
     assert not any(reading.late for reading in readings)
     assert bench.arm.counters.late == 0
 
@@ -110,13 +110,13 @@ def test_a_sound_arm_is_never_late():
 def test_a_cycle_without_a_request_still_sends_torques():
     bench = Bench()
     readings = bench.run(3 * EVERY)
-    assert unasked(readings) == [EVERY - 1, 2 * EVERY - 1, 3 * EVERY - 1]
+    assert cycles_without_request(readings) == [EVERY - 1, 2 * EVERY - 1, 3 * EVERY - 1]
     sent = [(i, d) for _, i, d in bench.rig.sent]
     assert sent.count(GET_P) == 3 * EVERY - 3
     assert sum(can_id == TORQUES for can_id, _ in sent) == 3 * EVERY
 
 
-def test_a_cycle_without_a_request_is_not_a_missing_one():
+def test_a_cycle_without_a_request_is_not_counted_as_missing():
     bench = Bench()
     readings = bench.run(EVERY)
     assert readings[-1].is_without_request
@@ -145,7 +145,7 @@ def test_a_single_late_reply_is_not_permanent_lateness():
     bench.rig.network.faults.delay(position_reply_id(6), 1_950_000)
     missed, next_one, then = bench.run(3)
     assert not missed.is_complete
-    # While an answer is owed every cycle asks.
+    # While a reply is outstanding every cycle sends a request.
     assert not next_one.is_without_request
     assert then.is_without_request
     assert then.late is None
@@ -190,7 +190,7 @@ def test_another_device_on_the_bus_is_polled_in_every_cycle():
             pass
 
     bench.arm.attach_device(Companion())
-    assert len(unasked(bench.run(EVERY))) == 1
+    assert len(cycles_without_request(bench.run(EVERY))) == 1
     assert len(asked) == EVERY
 
 
@@ -204,7 +204,7 @@ def test_a_start_reports_late_positions_as_late_and_not_missing():
 
 
 def test_a_cycle_without_a_request_waits_little_longer_than_an_exchange():
-    """The last answer comes after 0.6 ms; replies are given up after 1.5 ms."""
+    """The last reply arrives after 0.6 ms; the driver waits for 1.5 ms."""
     bench = Bench(first_read_ns=100_000)
     bench.run(EVERY - 1)
     begun_ns = bench.rig.clock.t_ns

@@ -1,4 +1,4 @@
-"""What the vendor's library neither reads nor verifies warns and does not refuse."""
+"""Values that the vendor's library does not check give a warning, not a refusal."""
 
 import numpy as np
 import pytest
@@ -18,11 +18,11 @@ CYCLE_NS = 2_000_000
 
 
 class Bench:
-    """An arm whose safety module shows the word that `change` makes of the true one."""
+    """An arm whose safety module reports its word modified by `change`."""
 
     def __init__(self, change=lambda word: word):
         self.change = change
-        # Long enough that the cycles of a test are no lost heartbeat.
+        # A heartbeat longer than any test.
         self.rig = Rig(NetworkOptions(heartbeat_ns=10_000_000_000))
         receive = self.rig.link.receive
         self.rig.link.receive = lambda: [self.altered(frame) for frame in receive()]
@@ -150,10 +150,10 @@ def test_a_value_the_vendor_library_needs_is_still_required(number):
 
 
 def test_firmware_and_warnings_are_recorded():
-    told = Bench(lambda _: 0).arm.start().metadata()
-    assert told["arm:firmware"] == "200 200 200 200 200 200 200"
-    assert told["arm:safety_firmware"] == "200"
-    assert "velocity, torque, voltage, heartbeat, other" in told["arm:warnings"]
+    fields = Bench(lambda _: 0).arm.start().metadata()
+    assert fields["arm:firmware"] == "200 200 200 200 200 200 200"
+    assert fields["arm:safety_firmware"] == "200"
+    assert "velocity, torque, voltage, heartbeat, other" in fields["arm:warnings"]
     assert Bench().arm.start().metadata()["arm:warnings"] == "none"
 
 

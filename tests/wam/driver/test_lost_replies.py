@@ -1,4 +1,4 @@
-"""What the driver makes of replies that are missing, late, doubled or wrong."""
+"""Missing, late, doubled and wrong replies are counted and give no wrong position."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ HOME_COUNTS = (0, -36833, 36832, -36728, 0, 0, 0)
 ZERO = np.zeros(7)
 CYCLE_NS = 2_000_000
 STEP = 20  # counts that each motor moves in a cycle
-# A reply so late comes between the next question and its answer.
+# A reply with this delay arrives between the next request and its reply.
 ALMOST_A_CYCLE_NS = 1_950_000
 
 
@@ -68,10 +68,10 @@ def test_missing_replies_are_counted_for_each_puck(bench):
 
 
 # Puck 1 answers first and puck 7 last, when the others are complete already; the
-# driver may look before all have come, or after.
+# driver may read before or after the arrival of all replies.
 @pytest.mark.parametrize("node", [1, 4, 7])
 @pytest.mark.parametrize("first_read_ns", [100_000, 700_000])
-def test_a_late_reply_never_answers_the_next_question(node, first_read_ns):
+def test_a_late_reply_is_never_taken_for_the_next_one(node, first_read_ns):
     bench = Bench(first_read_ns=first_read_ns)
     bench.cycle()
     bench.faults.delay(position_reply_id(node), ALMOST_A_CYCLE_NS)
@@ -90,7 +90,7 @@ def test_a_reply_that_comes_after_its_cycle_is_drained_before_the_next(bench):
     assert not bench.cycle().is_complete
     assert bench.is_true(bench.cycle())
     assert bench.arm.counters.stale == 1
-    assert bench.took_ns < 1_000_000  # nothing is owed any more, nothing waited for
+    assert bench.took_ns < 1_000_000  # no reply is outstanding, none is awaited
 
 
 def test_a_lost_reply_costs_only_the_wait_of_its_cycle(bench):
@@ -115,9 +115,9 @@ def test_a_doubled_reply_is_counted_and_changes_nothing(bench):
 )
 def test_a_second_sender_is_detected_within_a_few_cycles(bench, node, after_ns):
     bench.faults.answer_twice(position_reply_id(node), lambda data: data, after_ns)
-    found = [bench.cycle().doubled for _ in range(10)]
-    assert found[0] == 0
-    assert found[-1] == node
+    doubled = [bench.cycle().doubled for _ in range(10)]
+    assert doubled[0] == 0
+    assert doubled[-1] == node
 
 
 @pytest.mark.parametrize("after_ns", [0, 50_000, 1_000_000])
@@ -136,7 +136,7 @@ def test_swapped_replies_do_not_change_positions(bench):
         if not reading.is_without_request:
             assert bench.is_true(reading) is reading.is_complete
         assert reading.missing_cycles <= 1
-    assert incomplete == 4  # puck 6 is a question late every 50 questions
+    assert incomplete == 4  # puck 6 is one request late every 50 requests
     assert bench.arm.counters.rejected == 0
 
 
@@ -157,7 +157,7 @@ def test_heavy_foreign_bus_traffic_costs_no_cycle(bench):
     readings = [bench.cycle() for _ in range(500)]
     assert all(r.is_complete for r in readings)
     latest = max(r.arm_ns - r.host_ns for r in readings)
-    assert 1_000_000 < latest < 1_500_000  # later than alone, and in time
+    assert 1_000_000 < latest < 1_500_000  # later than on a quiet bus, but in time
 
 
 def test_an_interface_that_goes_down_is_reported_and_recovers(bench):
@@ -202,7 +202,7 @@ def test_no_torque_is_queued_while_frames_are_unacknowledged(bench):
     bench.rig.network.receive = lambda *frame: (heard.append(frame[1]), receive(*frame))
     bench.faults.clear_faults()
     before_ns = bench.rig.clock.t_ns
-    bench.arm.read(before_ns)  # what waited leaves before it
+    bench.arm.read(before_ns)  # queued frames leave before it
     assert heard.count(0x404) > 5
     assert not {0x401, 0x402} & set(heard)
 
@@ -317,5 +317,5 @@ def test_each_refused_frame_is_counted(bench):
     bench.arm.read(bench.rig.clock.t_ns)
     asked = bench.arm.counters.link_errors
     bench.arm.send(ZERO, ZERO)
-    assert asked == errors + 2  # the question for positions, and that for the mode
+    assert asked == errors + 2  # the request for positions and that for the mode
     assert bench.arm.counters.link_errors > asked

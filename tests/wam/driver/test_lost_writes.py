@@ -1,4 +1,4 @@
-"""Every write of a start and of a zeroing, lost one at a time, and what comes of it."""
+"""No lost write of a start or a zeroing makes a wrong position be accepted."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def rig_with(asleep):
 
 
 def lose(rig, number):
-    """Lose the write that is number `number` from now on; return all of them."""
+    """Lose the write with the index `number` from now on; return all writes."""
     writes = []
 
     def is_lost(_, data):
@@ -41,7 +41,7 @@ def lose(rig, number):
 
 
 def started(rig, lost):
-    """Return the arm and what its start says; None where the start is refused."""
+    """Return the arm and the report of its start; None if the start is refused."""
     arm = WamArm(rig.link, rig.clock, lost=lost)
     try:
         return arm, arm.start()
@@ -116,7 +116,7 @@ def test_a_start_that_ends_during_boot_leaves_the_arm_not_zeroed(
         patch.setattr("wam.driver.startup.StartUp._wake", interrupt)
         with pytest.raises(KeyboardInterrupt):
             WamArm(rig.link, rig.clock).start()
-    # Even for a program that knows nothing of the first start, once they are awake.
+    # Even for a program that does not know of the first start, once all are awake.
     assert rig.link.send(3, bytes.fromhex("85 00 02 00 00 00")) is None
     rig.rest(1_100_000_000)
     assert not WamArm(rig.link, rig.clock).start().is_zeroed
@@ -129,7 +129,7 @@ def test_lost_positions_are_recorded_on_disk_until_defined(
     rig = rig_with((3,))
     assert not WamArm(rig.link, rig.clock, lost=LostPositions(path)).start().is_zeroed
     assert "3" in path.read_text()
-    # Another program says that the arm is zeroed.
+    # Another program declares the arm zeroed.
     rig.link.send(10, encode_set(ZERO, 1))
     rig.rest(_NS)
     arm = WamArm(rig.link, rig.clock, lost=LostPositions(path))
@@ -139,7 +139,7 @@ def test_lost_positions_are_recorded_on_disk_until_defined(
     assert WamArm(rig.link, rig.clock, lost=LostPositions(path)).start().is_zeroed
 
 
-def test_a_note_that_cannot_be_removed_keeps_the_arm_refused(tmp_path, monkeypatch):
+def test_a_note_that_cannot_be_removed_keeps_the_arm_not_zeroed(tmp_path, monkeypatch):
     path = tmp_path / "positions-lost.txt"
     rig, lost = rig_with((3,)), LostPositions(path)
     arm = WamArm(rig.link, rig.clock, lost=lost)

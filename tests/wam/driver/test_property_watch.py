@@ -1,4 +1,4 @@
-"""What a puck said at the start is asked again while the arm is driven."""
+"""Properties read at the start are polled again while the arm is driven."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from wam.driver.settings import ArmSettings
 
 CYCLE_NS = 2_000_000
 EVERY = ArmSettings().watch_poll_cycles
-TURN = EVERY * len(WATCHED) * len(MOTOR_NODES)  # cycles until all were asked
+TURN = EVERY * len(WATCHED) * len(MOTOR_NODES)  # cycles until all were polled
 ZERO = np.zeros(7)
 
 
@@ -66,8 +66,8 @@ def test_all_properties_are_polled_in_turn_without_false_changes(vers):
     bench = Bench(vers=(vers,) * 7)
     assert bench.run(TURN + 100).change is None
     asked = {(i, d) for _, i, d in bench.rig.sent if i in MOTOR_NODES and len(d) == 1}
-    # Five of these, four of health, TEMP, THERM, VBUS and ERROR, of each puck, and MODE
-    # and T of what it holds.
+    # Of each puck the watched ones, four of telemetry (TEMP, THERM, VBUS, ERROR), MODE
+    # and T.
     assert len(asked) == (len(WATCHED) + 4 + 2) * len(MOTOR_NODES)
 
 

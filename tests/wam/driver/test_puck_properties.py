@@ -1,4 +1,4 @@
-"""A puck that is not as its arm should be is refused before the first torque."""
+"""A puck with unexpected properties is refused before the first torque."""
 
 import pytest
 
@@ -94,11 +94,11 @@ def test_properties_the_host_bounds_or_watches_only_warn(node, name, value):
 
 
 @pytest.mark.parametrize("mt", [1370, 1600])
-def test_both_known_wrists_pass(mt):
+def test_both_known_wrists_are_accepted(mt):
     assert start([(7, "MT", mt)]).warnings == ()
 
 
-def test_optical_encoders_pass_in_all_seven():
+def test_optical_encoders_in_all_seven_pucks_are_accepted():
     assert start(cts=(40960,) * 7).warnings == ()
 
 
@@ -128,7 +128,7 @@ def test_an_unanswered_property_is_a_warning():
     assert warning == "Puck 3 does not answer GET PIDX: it is not compared."
 
 
-def test_values_of_this_arm_take_precedence_over_the_factorys():
+def test_values_of_this_arm_take_precedence_over_factory_values():
     text = "[POLES]\nvalues = [12, 12, 12, 10, 8, 8, 6]\n"
     assert start([(4, "POLES", 10)], text).warnings == ()
     with pytest.raises(UnfitDeviceError, match="POLES of puck 4 is 12, expected 10"):

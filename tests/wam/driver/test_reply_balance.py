@@ -1,4 +1,4 @@
-"""What answers more often than it is asked is found; what is late or lost is not it."""
+"""A second sender is detected; late and lost replies are not taken for one."""
 
 import pytest
 
@@ -6,7 +6,7 @@ from wam.driver.reply_balance import ReplyBalance
 
 
 def ask(balance, replies, cycles=1):
-    """Ask so many times, motor 1 answering `replies` times and all others once."""
+    """Note `cycles` requests; motor 1 replies `replies` times, all others once."""
     for _ in range(cycles):
         balance.note_question()
         for i in range(7):

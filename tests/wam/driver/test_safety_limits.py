@@ -21,10 +21,10 @@ def start(rig, limits):
     return WamArm(rig.link, rig.clock, ArmSettings(safety_limits=limits)).start()
 
 
-def told(rig):
-    """Return (time, data) of everything the safety module was told of its limits."""
-    told = [(t, d) for t, i, d in rig.sent if i == 0x00A and len(d) == 6]
-    return [(t, d) for t, d in told if d[0] != IFAULT]
+def limit_writes(rig):
+    """Return (time, data) of every limit that was sent to the safety module."""
+    writes = [(t, d) for t, i, d in rig.sent if i == 0x00A and len(d) == 6]
+    return [(t, d) for t, d in writes if d[0] != IFAULT]
 
 
 def test_the_defaults_are_the_power_up_values():
@@ -37,7 +37,7 @@ def test_the_defaults_are_the_power_up_values():
 def test_limits_are_written_with_the_golden_bytes():
     rig = Rig()
     start(rig, RAISED)
-    assert [data.hex(" ") for _, data in told(rig)][8:] == [
+    assert [data.hex(" ") for _, data in limit_writes(rig)][8:] == [
         "ad 00 99 15 00 00",
         "ae 00 00 18 00 00",
         "af 00 7a 1c 00 00",
@@ -48,7 +48,7 @@ def test_limits_are_written_with_the_golden_bytes():
 def test_each_limit_is_reset_to_its_power_up_value_first():
     rig = Rig()
     start(rig, RAISED)
-    resets = [data.hex(" ") for _, data in told(rig)][:8]
+    resets = [data.hex(" ") for _, data in limit_writes(rig)][:8]
     assert resets == [
         f"{what} 00 {number} 00 00 00"
         for number in ("2d", "2e", "2f", "30")
@@ -59,7 +59,7 @@ def test_each_limit_is_reset_to_its_power_up_value_first():
 def test_configuration_frames_are_spaced():
     rig = Rig()
     start(rig, RAISED)
-    times = [t for t, _ in told(rig)]
+    times = [t for t, _ in limit_writes(rig)]
     assert len(times) == 12
     assert min(b - a for a, b in pairwise(times)) >= 10_000_000
 

@@ -115,16 +115,16 @@ def test_zero_is_marked_and_confirmed():
 
 
 class Answers:
-    """A module that answers everything with one number."""
+    """A module that answers every request with one number."""
 
     def __init__(self, value):
-        self.value, self.wanted = value, []
+        self.value, self.written = value, []
 
     def require(self, node, number, name):
         return self.value
 
     def set(self, node, number, value):
-        self.wanted.append((node, number, value))
+        self.written.append((node, number, value))
 
     def pause(self, duration_ns):
         """Wait for nothing."""
@@ -140,4 +140,4 @@ def test_a_module_that_rejects_the_zero_is_an_error():
     answers = Answers(0)
     with pytest.raises(DeviceFaultError, match="ZERO"):
         SafetyModule(answers, None, 200).mark_zeroed()
-    assert [value for *_, value in answers.wanted] == [1]
+    assert [value for *_, value in answers.written] == [1]

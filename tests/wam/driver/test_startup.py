@@ -1,4 +1,4 @@
-"""Start-up: who is late, who is missing, and what the encoders say."""
+"""Start-up finds late devices, names missing ones and reads the encoders."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -184,23 +184,23 @@ def test_a_puck_without_its_constants_is_refused(name, value):
 
 @pytest.mark.parametrize("mode", [SafetyMode.IDLE, SafetyMode.ACTIVE])
 def test_motors_are_idled_unless_the_arm_is_active(mode):
-    # As long a heartbeat that start-up is no silence of the host.
+    # A heartbeat longer than the start-up.
     rig = Rig(NetworkOptions(heartbeat_ns=10_000 * MS), HOME_COUNTS)
     if mode is SafetyMode.ACTIVE:
         rig.network.pendant("activate")
     rig.sent.clear()
     info = start(rig)
     assert info.safety_mode is mode
-    told = [d for _, i, d in rig.sent if i == 0x404 and len(d) == 6 and d[0] == 0x88]
-    assert told == ([] if mode is SafetyMode.ACTIVE else [b"\x88" + bytes(5)])
+    idled = [d for _, i, d in rig.sent if i == 0x404 and len(d) == 6 and d[0] == 0x88]
+    assert idled == ([] if mode is SafetyMode.ACTIVE else [b"\x88" + bytes(5)])
 
 
 def test_indistinguishable_pucks_give_a_warning():
     rig = Rig(counts=HOME_COUNTS)
     assert not any("same serial" in text for text in start(rig).warnings)
     rig.network.set_property(3, "SN", 1005)
-    (told,) = [text for text in start(rig).warnings if "same serial" in text]
-    assert "1001 1002 1005 1004 1005 1006 1007" in told
+    (warning,) = [text for text in start(rig).warnings if "same serial" in text]
+    assert "1001 1002 1005 1004 1005 1006 1007" in warning
 
 
 @pytest.mark.parametrize("hidden", ["safety_serial", "safety_vers", None])

@@ -1,4 +1,4 @@
-"""What the arm's driver asks in the free bus time, and what it makes of the answers."""
+"""The driver polls mode, monitors and telemetry in the free bus time."""
 
 from collections import Counter
 
@@ -33,14 +33,14 @@ POSITIONS_AND_TORQUES = {0x404, 0x401, 0x402}
 
 class Bench:
     def __init__(self):
-        # Long enough that the cycles of a test are no lost heartbeat.
+        # A heartbeat longer than any test.
         self.rig = Rig(NetworkOptions(heartbeat_ns=10_000_000_000), HOME_COUNTS)
         self.arm = WamArm(self.rig.link, self.rig.clock)
         self.arm.start()
         self.rig.sent.clear()
 
     def run(self, cycles, *, is_sending=True):
-        """Run; return the questions of each cycle."""
+        """Run; return the requests of each cycle."""
         asked = []
         for _ in range(cycles):
             self.rig.sent.clear()
@@ -71,7 +71,7 @@ def test_mode_and_pendant_alternate_and_pucks_have_their_own_period(bench):
     assert safety == [GET_MODE, GET_PEN] * 40
     health = [q for q in asked if q[0] != 0x00A and q[1] in HEALTH]
     assert len(health) == 20
-    # As often one is asked for what it said at the start; for the rest, what it holds.
+    # Watched properties are polled as often; the remaining requests are of MODE and T.
     held = [q for q in asked if q[0] != 0x00A and q[1] in (b"\x08", b"\x2a")]
     assert len(asked) - len(safety) - len(health) - len(held) == 20
     assert len(held) > 200
@@ -118,7 +118,7 @@ def test_a_change_of_mode_is_explained_in_the_cycle_after_it_is_known(bench):
     assert bench.arm.safety_faults() == ("torque",)
 
 
-def test_idle_knows_the_cause_at_once(bench):
+def test_idle_reads_the_cause_of_a_stop(bench):
     bench.rig.network.pendant("activate")
     bench.run(3)
     bench.rig.network.pendant("estop")
@@ -142,7 +142,7 @@ def test_an_invalid_word_is_counted_and_ignored(bench, monkeypatch):
     assert bench.arm.idle()
 
 
-def test_an_arm_that_is_only_read_is_watched_too(bench):
+def test_the_mode_is_polled_while_no_torques_are_sent(bench):
     bench.run(5)
     bench.rig.network.pendant("activate")
     bench.run(60, is_sending=False)
@@ -167,7 +167,7 @@ def test_an_unconfirmed_idle_is_repeated_until_confirmed(bench):
     ]
 
 
-def test_an_arm_that_confirms_later_is_known_to_be_idle(bench):
+def test_a_late_confirmation_of_idle_is_accepted(bench):
     bench.rig.network.pendant("activate")
     bench.run(3)
     bench.rig.network.silence(10)
@@ -187,7 +187,7 @@ def test_temperatures_are_reported_from_coldest_to_hottest():
 
 def test_a_silent_puck_is_shown_with_the_age_of_its_last_reply(bench):
     bench.rig.network.silence(3)
-    bench.run(7 * 50 * 5)  # five questions to each puck
+    bench.run(7 * 50 * 5)  # five requests to each puck
     now_ns, pucks = bench.rig.clock.t_ns, bench.arm.health()
     assert (pucks[2].puck_degc, pucks[2].is_recent(now_ns)) == (35, False)
     assert temperature_range(pucks, now_ns) == "33-35 °C, puck 3 silent for 4 s"
@@ -243,7 +243,7 @@ def test_an_undefined_mode_is_not_a_reply(bench, monkeypatch):
     assert bench.arm.safety_mode() is SafetyMode.UNKNOWN
 
 
-def test_listening_takes_no_time(bench):
+def test_listening_does_not_wait(bench):
     now_ns = bench.rig.clock.t_ns
     bench.arm.listen(now_ns)
     assert bench.rig.clock.t_ns == now_ns
@@ -339,19 +339,19 @@ def test_a_start_clears_earlier_doubts_and_exempts_ambiguous_monitors():
 
 
 @pytest.mark.parametrize(
-    ("node", "said", "mode", "contradicted_by"),
+    ("node", "reported", "mode", "contradicted_by"),
     [
         (2, PuckMode.IDLE, SafetyMode.IDLE, set()),
         (2, PuckMode.TORQUE, SafetyMode.UNKNOWN, {2}),
         (3, PuckMode.IDLE, SafetyMode.UNKNOWN, {2}),
         (10, SafetyMode.IDLE, SafetyMode.UNKNOWN, {2}),
-        (9, SafetyMode.ACTIVE, SafetyMode.UNKNOWN, {2}),  # nobody of the arm
+        (9, SafetyMode.ACTIVE, SafetyMode.UNKNOWN, {2}),  # no node of the arm
     ],
 )
 def test_only_the_contradicting_puck_resolves_the_contradiction(
-    node, said, mode, contradicted_by
+    node, reported, mode, contradicted_by
 ):
     poller = StatusPoller(Bus(), ArmSettings())
     poller.contradict([2])
-    poller.on_frame(property_reply_id(node), encode_reply(8, said, is_wide=False))
+    poller.on_frame(property_reply_id(node), encode_reply(8, reported, is_wide=False))
     assert (poller.mode, poller.contradicted_by) == (mode, contradicted_by)

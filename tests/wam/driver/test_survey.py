@@ -1,4 +1,4 @@
-"""Who says what on a bus, counted before anything is known of its arm."""
+"""Devices and frames on a bus are counted before the arm is started."""
 
 from collections import Counter
 
@@ -65,7 +65,7 @@ def test_a_request_answered_twice_once_is_counted(rig):
 @pytest.mark.parametrize(
     "other", [encode_reply(STAT + 1, 2, is_wide=False), b"\x05", b"", bytes(8)]
 )
-def test_a_reply_to_another_request_or_none_is_ignored(rig, other):
+def test_a_reply_that_does_not_match_the_request_is_ignored(rig, other):
     rig.network.faults.answer_twice(property_reply_id(5), lambda _: other, MS)
     answers = count(rig)
     assert (answers.counts, answers.differing) == (ONCE, [])

@@ -186,7 +186,7 @@ def test_a_barely_invertible_transmission_is_accepted():
 
 @pytest.mark.parametrize("motor", [0, 4, 6])
 def test_every_motor_has_its_own_limit_of_torque(motor):
-    """Each motor's share of a torque that is far beyond all of them."""
+    """A torque far beyond all limits is clipped to the limit of its motor."""
     wam = Transmission(np.eye(7), CTS, IPNM)
     tau = np.zeros(7)
     tau[motor] = 1e3

@@ -1,7 +1,6 @@
-"""The traps of the WAM's protocol, numbered as in its description; one test for each.
+"""Traps of the WAM's protocol, numbered as in its description, each with its tests.
 
-Each drives the driver against the simulated network, or one of the two alone where the
-trap is about it.
+Tests run the driver against the simulated network, or one of the two alone.
 """
 
 import re
@@ -69,7 +68,7 @@ def cycle(rig, arm, tau=ZERO):
 
 
 def answers(rig, can_id, data, within_ns=MS):
-    """Send a frame; return (identifier, data) of what comes back."""
+    """Send a frame; return (identifier, data) of the replies."""
     rig.link.send(can_id, data)
     rig.rest(within_ns)
     return [(frame.can_id, bytes(frame.data)) for frame in rig.link.receive()]
@@ -119,7 +118,7 @@ def test_trap_04_the_module_judges_a_torque_before_the_puck_clips_it():
     rig, arm, _ = started()
     rig.network.pendant("activate")
     cycle(rig, arm)
-    # 14 bits carry it and the puck clips it to MT = 4860; it faults all the same.
+    # 14 bits carry it and the puck clips it to MT = 4860; the module faults anyway.
     frame = encode_torques([POWER_UP_TL2 + 1, 0, 0, 0])
     assert decode_torques(frame)[0] == POWER_UP_TL2 + 1
     rig.link.send(LOWER, frame)
@@ -128,7 +127,7 @@ def test_trap_04_the_module_judges_a_torque_before_the_puck_clips_it():
     assert rig.network.safety_mode is SafetyMode.IDLE
 
 
-def test_trap_04_the_driver_clips_below_what_the_module_warns_of():
+def test_trap_04_the_driver_clips_below_the_warning_of_the_module():
     rig, arm, _ = started()
     rig.network.pendant("activate")
     for sign in (1.0, -1.0):
@@ -181,7 +180,7 @@ def test_trap_07_a_set_is_not_acknowledged():
         assert answers(rig, can_id, data, 50 * MS) == []
 
 
-def test_trap_07_a_late_reply_does_not_answer_the_next_question():
+def test_trap_07_a_late_reply_is_not_taken_for_the_next_one():
     rig, arm, _ = started()
     rig.network.faults.delay(position_reply_id(7), 1_950_000)
     assert not cycle(rig, arm).is_complete
@@ -204,7 +203,7 @@ def test_trap_08_a_device_that_answers_too_late_counts_as_absent():
         WamArm(rig.link, rig.clock).start()
 
 
-def test_trap_09_nobody_talks_while_pucks_boot():
+def test_trap_09_the_bus_is_quiet_while_pucks_boot():
     rig = Rig(NetworkOptions(are_asleep=True))
     WamArm(rig.link, rig.clock).start()
     wake = encode_set(5, 2)
@@ -215,7 +214,7 @@ def test_trap_09_nobody_talks_while_pucks_boot():
     assert min(t for t, _, _ in rig.sent if t > times[-1]) - times[-1] >= 1000 * MS
 
 
-def test_trap_10_the_version_that_counts_is_read_after_waking():
+def test_trap_10_the_firmware_version_is_read_after_waking():
     options = NetworkOptions(are_asleep=True, monitor_vers=5, vers=(128,) * 7)
     rig = Rig(options, HOME_COUNTS)
     asleep = answers(rig, 1, encode_get(0))
@@ -255,13 +254,13 @@ def test_trap_11_defined_positions_jump_and_are_announced(is_announced):
 def test_trap_12_counts_and_the_frames_torques_are_floored():
     settings = ArmSettings()
     gear = Transmission(settings.j2mp, (4096,) * 7, (2700,) * 7)
-    a_hair = np.array([1e-6, 0, 0, 0, 0, 0, 0])
-    assert abs(gear.exact_counts(a_hair)[0]) < 0.5  # rounding would give 0 twice
-    assert {gear.counts(a_hair)[0], gear.counts(-a_hair)[0]} == {-1, 0}
+    tiny = np.array([1e-6, 0, 0, 0, 0, 0, 0])
+    assert abs(gear.exact_counts(tiny)[0]) < 0.5  # rounding would give 0 twice
+    assert {gear.counts(tiny)[0], gear.counts(-tiny)[0]} == {-1, 0}
     assert decode_torques(encode_torques([-64.28, 64.99, 0, 0]))[:2] == (-65, 64)
 
 
-def test_trap_12_the_driver_rounds_first_so_that_nothing_pulls():
+def test_trap_12_the_driver_rounds_torques_before_they_are_floored():
     rig, arm, info = started()
     unit = 42.0 / info.pucks[0].ipnm  # joint torque of one unit of motor 1 [N m]
     rig.sent.clear()
@@ -271,7 +270,7 @@ def test_trap_12_the_driver_rounds_first_so_that_nothing_pulls():
     assert sent == [0, 0]
 
 
-def test_trap_13_a_force_is_believed_only_after_its_torque_of_6_or_7_bytes():
+def test_trap_13_a_force_is_accepted_only_with_its_torque_of_6_or_7_bytes():
     pairing = WrenchPairing(BarrettCounters())
     found = []
     for status in (None, 0xC4):
@@ -293,12 +292,12 @@ def test_trap_14_group_4_is_the_whole_arm():
     assert answers(rig, compose_id(0, 5, is_group=True), encode_get(48)) == []
 
 
-def test_trap_15_frames_540_are_a_hint_and_never_an_answer():
+def test_trap_15_frames_540_cause_a_request_and_are_not_trusted():
     rig, arm, _ = started()
     for _ in range(5):
         cycle(rig, arm)
     rig.sent.clear()
-    # Whatever it says, the mode is asked for; nothing of it is believed.
+    # A broadcast only causes a request of the mode; its content is not trusted.
     due = rig.network.due
     lie = [(rig.clock.t_ns, MODE_BROADCAST_ID, encode_position(0) + b"\2")]
     rig.network.due = lambda t_ns: [*due(t_ns), *(lie.pop() for _ in lie[:])]

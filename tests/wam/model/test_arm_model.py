@@ -103,7 +103,7 @@ def test_a_path_is_evaluated_at_every_pose(foot_model, arm_vectors):
     assert close(path.rotation, [v["tool_rotation"] for v in arm_vectors["vectors"]])
 
 
-def test_an_empty_path_is_a_path(foot_model):
+def test_an_empty_path_has_no_poses(foot_model):
     path = foot_model.sole_path(np.empty((0, 7)))
     assert (path.position.shape, path.rotation.shape) == ((0, 3), (0, 3, 3))
 
@@ -145,7 +145,7 @@ def test_a_model_without_a_tool_ends_at_the_plate(bare):
     assert np.array_equal(bare.sole_pose(q)[0], bare.plate_pose(q)[0])
 
 
-def test_the_quaternion_of_a_motion_turns_as_its_matrix(foot_model, q):
+def test_the_quaternion_of_a_motion_agrees_with_its_rotation_matrix(foot_model, q):
     pose, rotation, _ = foot_model.sole_motion(q, q)
     x, y, z, w = pose[3:]
     v = np.array([x, y, z])
@@ -156,7 +156,7 @@ def test_the_quaternion_of_a_motion_turns_as_its_matrix(foot_model, q):
 
 
 def test_the_quaternion_of_a_motion_never_changes_its_sign(foot_model):
-    turns = np.linspace(-3.0, 3.0, 50)  # of joint 7: some would come out negative
+    turns = np.linspace(-3.0, 3.0, 50)  # of joint 7: some would have a negative sign
     poses = [foot_model.sole_motion(t * np.eye(7)[6], np.zeros(7))[0] for t in turns]
     assert min(pose[6] for pose in poses) >= 0.0
 

@@ -1,4 +1,4 @@
-"""Distances of the arm to itself, the floor and what stands around it."""
+"""Distances of the arm to itself, to the floor and to obstacles."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def sphere_at(point, side):
 
 
 @pytest.mark.parametrize("name", COLLIDING)
-def test_a_colliding_pose_is_reported_with_its_pair_of_bodies(clearance, name):
+def test_a_colliding_pose_is_within_the_margin(clearance, name):
     q, *_ = COLLIDING[name]
     assert clearance.nearest(np.array(q, dtype=float)).distance < CLEARANCE_MARGIN
 
@@ -51,15 +51,15 @@ def test_floor_clearance_of_the_foot_agrees_with_the_kinematics(example_tool):
     assert height.distance == pytest.approx(0.2, abs=0.01)
 
 
-def test_the_floor_is_the_surface_the_arm_stands_on():
+def test_the_floor_is_below_the_base_frame_by_its_height():
     assert pytest.approx(0.346) == BASE_HEIGHT
 
 
 def test_an_obstacle_is_at_its_stated_location(example_tool):
     model = ArmModel(CONSTANTS, example_tool)
     sole, rotation = model.sole_pose(UPRIGHT)
-    beside = sole + 0.2 * rotation[:, 2]  # 200 mm on, half a side nearer
-    box = ObstacleBox("the post", beside, np.full(3, 0.1), rotation)
+    center = sole + 0.2 * rotation[:, 2]  # 200 mm away, its face 150 mm
+    box = ObstacleBox("the post", center, np.full(3, 0.1), rotation)
     gap = ArmClearance(CONSTANTS, example_tool, (box,)).nearest(UPRIGHT)
     assert {gap.first, gap.second} == {"the foot", "the post"}
     assert gap.distance == pytest.approx(0.15, abs=0.01)
@@ -80,8 +80,8 @@ def test_a_path_through_an_obstacle_collides_though_both_ends_are_free(example_t
     assert clearance.first_collision(start, start) is None
 
 
-def test_a_thin_post_is_not_stepped_over(example_tool):
-    """Whatever a way's length, two looks are at most 20 mrad, 20 mm at 1 m, apart."""
+def test_a_thin_post_is_not_missed(example_tool):
+    """Checked poses of any path are at most 20 mrad, 20 mm at 1 m, apart."""
     start, goal = UPRIGHT.copy(), UPRIGHT.copy()
     start[0], goal[0] = -2.5, 2.5
     assert np.abs(np.diff(straight_path(start, goal), axis=0)).max() <= STEP
@@ -169,7 +169,7 @@ ON_FLOOR = ("the upper arm", "the elbow", "the forearm", "the wrist", "the foot"
 
 
 def test_every_body_encloses_the_measured_arm(example_tool, clearance):
-    """Distances of all pairs against ones made here from the table of the joints."""
+    """Distances of all pairs agree with those derived here from the DH table."""
     rng = np.random.default_rng(3)
     bodies = enclosing(example_tool)
     for q in rng.uniform(CONSTANTS.q_lower, CONSTANTS.q_upper, (8, 7)):
@@ -201,12 +201,12 @@ def test_a_path_is_checked_end_to_end_in_equal_steps():
     assert len(straight_path(start, start + 0.999 * STEP)) == 2
 
 
-def test_the_margin_is_thirty_millimetres():
+def test_the_margin_has_its_documented_value():
     assert pytest.approx(0.03) == CLEARANCE_MARGIN
 
 
-class Staged(ArmClearance):
-    """Gaps that are given for each look at the way of joint 1 from 0 to 1 rad."""
+class GivenGaps(ArmClearance):
+    """A clearance with given gaps at the steps of joint 1 from 0 to 1 rad."""
 
     def __init__(self, tool, gaps):
         super().__init__(CONSTANTS, tool)
@@ -236,5 +236,5 @@ LAST = len(straight_path(np.zeros(7), np.eye(7)[0])) - 1
 def test_a_clear_path_comes_no_closer_than_the_margin_or_its_ends(
     example_tool, gaps, is_hit
 ):
-    hit = Staged(example_tool, gaps).first_collision(np.zeros(7), np.eye(7)[0])
+    hit = GivenGaps(example_tool, gaps).first_collision(np.zeros(7), np.eye(7)[0])
     assert (hit is not None) is is_hit

@@ -16,7 +16,7 @@ def test_the_shipped_arm_is_read():
     assert len(SHIPPED.links) == 7
 
 
-def test_home_stands_on_two_stops():
+def test_home_is_at_two_joint_stops():
     outside = (SHIPPED.home >= SHIPPED.q_upper) | (SHIPPED.home <= SHIPPED.q_lower)
     assert np.flatnonzero(outside).tolist() == [1, 3]
 
@@ -38,7 +38,7 @@ def test_inertias_are_physically_consistent():
         assert moments[2] < moments[0] + moments[1]  # the triangle inequality
 
 
-def test_one_joint_of_a_pair_is_driven_by_two_motors():
+def test_the_transmission_matrix_is_invertible():
     assert np.linalg.matrix_rank(SHIPPED.j2mp) == 7
 
 

@@ -38,7 +38,7 @@ def test_joint_friction_is_recovered_from_the_motors_that_share_it():
     )
 
 
-def test_steady_friction_is_against_the_motion_and_falls_from_breakaway():
+def test_steady_friction_opposes_the_motion_and_falls_from_breakaway():
     friction, still = example(), np.zeros(7)
     load_torque = np.full(7, 0.1)
     slow = friction.steady(still, load_torque, np.full(7, 1e-6))

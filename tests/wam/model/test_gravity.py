@@ -9,7 +9,7 @@ DOWN = np.array([0, 0.9, 0, 1.6, 0, np.pi - 2.5, 0])
 J2, J4, J6 = 1, 3, 5
 
 
-def test_without_a_virtual_mass_the_whole_arm_floats(foot_model):
+def test_without_a_virtual_mass_the_whole_weight_is_compensated(foot_model):
     tau = compensation(foot_model, DOWN, 0.0)
     expected = [-26.532280181, -5.109250202, 0.044017118]
     assert tau[[J2, J4, J6]] == pytest.approx(expected, abs=1e-9)
@@ -21,7 +21,7 @@ def test_a_virtual_mass_reduces_the_holding_torque(foot_model):
     assert added[[J2, J4, J6]] == pytest.approx(expected, abs=1e-9)
 
 
-def test_the_sum_is_what_is_commanded(foot_model):
+def test_the_commanded_torque_is_the_sum_of_both(foot_model):
     tau = compensation(foot_model, DOWN, 0.3)
     expected = [-24.576964652, -4.504189691, 0.014587118]
     assert tau[[J2, J4, J6]] == pytest.approx(expected, abs=1e-9)
@@ -33,7 +33,7 @@ def test_every_pose_agrees_with_the_reference_vectors(foot_model, arm_vectors):
         assert np.allclose(tau, vector["augmented_gravity"], rtol=0.0, atol=1e-9)
 
 
-def test_the_ground_bears_the_virtual_weight(foot_model):
+def test_the_ground_supports_the_virtual_weight(foot_model):
     """Below the centre of mass, the ground's force balances the added torque."""
     ground = np.array([0.0, 0.0, 0.3 * GRAVITY])
     from_ground = foot_model.sole_jacobian(DOWN)[:3].T @ ground

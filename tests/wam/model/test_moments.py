@@ -92,7 +92,7 @@ def test_calibration_recovers_the_torques_of_a_perturbed_arm():
     error = np.sqrt(np.mean((found - torques(arm, others)) ** 2))
     assert error < 0.1
     untouched = np.sqrt(np.mean((torques(CONSTANTS, others) - found) ** 2))
-    assert untouched > 0.3  # the perturbation was worth a calibration
+    assert untouched > 0.3  # the perturbation is large enough to need a calibration
 
 
 def test_too_few_poses_are_refused():
@@ -131,12 +131,12 @@ def test_a_residual_that_is_not_a_number_is_refused():
         check_fit(fit)
 
 
-def test_shapes_must_agree():
+def test_poses_and_torques_of_different_shapes_are_refused():
     with pytest.raises(ValueError, match=r"\(n, 7\)"):
         fit_moments(CONSTANTS, np.zeros((3, 7)), np.zeros((2, 7)))
 
 
-def test_a_model_with_the_shipped_moments_has_their_mass(example_tool):
+def test_a_model_with_the_shipped_moments_gives_their_torques(example_tool):
     model = gravity_model(CONSTANTS, example_tool, CONSTANTS.mus)
     bare = ArmModel(CONSTANTS)
     loaded = ArmModel(CONSTANTS, example_tool)
@@ -156,7 +156,7 @@ def test_moments_fitted_with_one_foot_apply_to_another(example_tool, mass):
     truth = ArmModel(CONSTANTS, session)
     for q in random_poses(10, seed=8):
         assert model.gravity(q) == pytest.approx(truth.gravity(q), abs=1e-11)
-        # the virtual mass pulls at the centre of the foot that is on
+        # the virtual mass pulls at the centre of the mounted foot
         assert model.weight_torque(q, 0.3) == pytest.approx(
             truth.weight_torque(q, 0.3), abs=1e-12
         )

@@ -1,4 +1,4 @@
-"""Poses with the sole flat on a plane, computed anew."""
+"""Start poses are computed with the sole flat on the far end of the plane."""
 
 import numpy as np
 import pytest
@@ -48,7 +48,7 @@ def test_the_sole_is_flat_on_the_far_end(changes):
     assert q[3] > 0.0
 
 
-def test_a_stated_pose_serves_a_push_in_the_other_direction():
+def test_the_start_pose_of_an_opposite_push_is_at_the_other_end():
     q = start_of(row(push_deg=180), MODEL)
     near = terrain_frame(row(push_deg=180)).far_end
     assert MODEL.sole_pose(q)[0] == pytest.approx(near, abs=1e-6)

@@ -1,4 +1,4 @@
-"""Zeros of the joints by the torques that hold the arm: which show, and how well."""
+"""Zero errors of joints are identified from holding torques where observable."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ from wam.model.moments import (
 )
 
 CONSTANTS = load_constants()
-# N m, rms: what a real arm leaves unexplained when all is well.
+# Residual of a sound real arm [N m], rms.
 NOISE = 0.1
 DEVIATIONS = {2: 0.6, 3: 1.2, 4: 5.0, 5: 5.0}  # degrees at that noise, 12 poses
 
@@ -33,7 +33,7 @@ def poses(model):
 
 
 def measured(model, poses, joint=2, degrees=0.0, noise=0.0, seed=1):
-    """Return what is said of an arm one of whose joints is zeroed elsewhere."""
+    """Return the zero errors identified for an arm with one wrongly zeroed joint."""
     true = poses.copy()
     true[:, joint - 1] += np.radians(degrees)
     tau = np.array([model.gravity(q) for q in true])
@@ -59,11 +59,11 @@ def test_a_wrong_zero_of_joints_1_6_and_7_is_not_observable(model, poses, joint)
 
 
 def test_the_stated_uncertainty_of_a_zero_is_correct(model, poses):
-    every = [measured(model, poses, noise=NOISE, seed=seed) for seed in range(40)]
-    spread = np.degrees(np.std([found.errors for found in every], axis=0))
-    told = np.degrees(np.mean([found.deviations for found in every], axis=0))
-    assert told == pytest.approx(spread, rel=0.35)
-    assert (told < list(DEVIATIONS.values())).all()
+    fits = [measured(model, poses, noise=NOISE, seed=seed) for seed in range(40)]
+    spread = np.degrees(np.std([found.errors for found in fits], axis=0))
+    stated = np.degrees(np.mean([found.deviations for found in fits], axis=0))
+    assert stated == pytest.approx(spread, rel=0.35)
+    assert (stated < list(DEVIATIONS.values())).all()
 
 
 def test_a_sound_arm_is_not_refused(model, poses):
