@@ -328,7 +328,7 @@ def test_only_joints_whose_limit_is_armed_are_judged():
 
 
 def late_cycles(times, state=ARMED):
-    """Return state and verdict after late cycles at `times`, with punctual ones before."""
+    """Return state and verdict after late cycles at `times`, punctual ones before."""
     verdict = OK
     for t_ns in times:
         state, _ = check(LIMITS, state, seen(host_ns=t_ns - 2 * MS))

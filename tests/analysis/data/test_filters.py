@@ -1,4 +1,4 @@
-"""The filters against the library's, whose loading they save."""
+"""Filters agree with those of SciPy, whose slow import they avoid."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Channels that stand still among others that do not are told, coarse ones are not."""
+"""Frozen channels among changing ones are reported, coarse ones are not."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ RATE = 500.0
 
 
 def sliding(seconds=6.0, resolution=0.02, noise=0.1, seed=0):
-    """Return times and the wrench of a foot that slides, its steps `resolution`."""
+    """Return times and the wrench of a sliding foot, quantised to `resolution`."""
     rng = np.random.default_rng(seed)
     n = round(seconds * RATE)
     load = np.cumsum(rng.normal(scale=0.05, size=(n, 6)), axis=0)
@@ -20,7 +20,7 @@ def sliding(seconds=6.0, resolution=0.02, noise=0.1, seed=0):
 
 
 def axes(t, wrench):
-    return [found.axis for found in frozen_channels(t, wrench)]
+    return [channel.axis for channel in frozen_channels(t, wrench)]
 
 
 @pytest.mark.parametrize("resolution", [0.0, 0.02, 0.1, 0.5])
@@ -36,12 +36,12 @@ def test_a_frozen_channel_is_reported_with_value_and_time(axis, begin, end):
     t, wrench = sliding()
     still = (t >= begin) & (t < end)
     wrench[still, axis] = -3.25
-    (found,) = frozen_channels(t, wrench)
-    assert found.axis == axis
-    assert found.value == pytest.approx(-3.25)
-    assert found.seconds == pytest.approx(end - begin, abs=0.02)
+    (channel,) = frozen_channels(t, wrench)
+    assert channel.axis == axis
+    assert channel.value == pytest.approx(-3.25)
+    assert channel.seconds == pytest.approx(end - begin, abs=0.02)
     unit = "N" if axis < 3 else "N m"
-    assert f" stands at -3.25 {unit} for {end - begin:.1f} s" in found.text
+    assert f" stands at -3.25 {unit} for {end - begin:.1f} s" in channel.text
 
 
 def test_a_channel_stuck_within_one_bit_is_reported():

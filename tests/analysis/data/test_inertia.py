@@ -35,7 +35,7 @@ def test_the_force_is_mass_times_acceleration():
     assert force[inner] == pytest.approx(wanted[inner], abs=0.02 * np.abs(wanted).max())
 
 
-def test_its_uncertainty_is_the_spread_of_repeated_measurements():
+def test_the_uncertainty_of_the_force_is_the_spread_of_repetitions():
     noise = np.random.default_rng(3).normal(0, 1e-5, (200, 300, 3))
     t = T[:300]
     forces = np.array([inertial_force(t, n, 0.5).force[150] for n in noise])
@@ -64,7 +64,7 @@ def test_samples_that_show_no_acceleration_are_refused(t):
 
 @pytest.fixture(scope="module")
 def shaken(tmp_path_factory):
-    """Return a trial whose joints swing under a force that stays."""
+    """A trial whose joints swing under a constant force."""
     cycles = make_cycles(400)
     t = np.arange(400) * 0.002
     swing = np.zeros((400, 7))
@@ -101,7 +101,7 @@ def test_the_correction_is_reported_with_its_uncertainty(shaken):
     assert kept.with_remark([shaken]).remark == ""
 
 
-def test_a_table_has_no_mass(shaken):
+def test_inertia_is_not_removed_from_a_table(shaken):
     with pytest.raises(SettingsError, match="tables have no"):
         parse_choice("inertia=removed").series(shaken.series())
 
@@ -119,8 +119,8 @@ def test_inertia_correction_brings_a_simulated_trial_nearer_to_the_truth(tmp_pat
     true = np.interp(t_ns, t_true_ns.astype(float), truth["traction"][:, 1])
 
     def error(chosen):
-        """Return the spread of what the sensor's slow errors are not [N]."""
-        rest = chosen.traction[:, 1] - true
-        return float(np.std(np.diff(np.convolve(rest, np.ones(5) / 5, "valid"))))
+        """Return the spread of the error without the sensor's slow part [N]."""
+        residual = chosen.traction[:, 1] - true
+        return float(np.std(np.diff(np.convolve(residual, np.ones(5) / 5, "valid"))))
 
     assert error(trial.without_inertia()) < error(trial)

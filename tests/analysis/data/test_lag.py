@@ -1,4 +1,4 @@
-"""Forces that come late: the offset is found, stated and taken back."""
+"""The lag of a force is estimated, reported and removed."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ MASS, DAMPING = 4.0, 90.0  # kg, N s/m: of an arm and the hand that holds it
 
 
 def jamming(late=0.0, rate=500.0, seconds=8.0, seed=0):
-    """Return a trial whose force moves a mass with a damper, and comes `late` [s]."""
+    """Return a trial whose force moves a damped mass and is recorded `late` [s]."""
     from scipy.signal import butter, lfilter, sosfilt
 
     rng = np.random.default_rng(seed)
@@ -68,8 +68,8 @@ def test_lost_rows_are_not_an_offset(every):
 
 @pytest.mark.parametrize("terrain", ["S0", "B10"])
 def test_the_offset_of_another_programs_trials_is_small(slice_trials, terrain):
-    known = [lag for s in slice_trials.get(terrain, []) if (lag := lag_of(s))]
-    assert all(abs(lag.seconds) < 3e-3 for lag in known)
+    lags = [lag for s in slice_trials.get(terrain, []) if (lag := lag_of(s))]
+    assert all(abs(lag.seconds) < 3e-3 for lag in lags)
 
 
 def test_a_smooth_slip_gives_no_lag(slice_trials):
@@ -96,7 +96,7 @@ def test_a_partly_explained_force_gives_no_lag():
         )
     )
     noisy = replace(series, F_t=series.F_t + 6.0 * fast)
-    lag = lag_of(noisy)  # the motion explains what is below 40 Hz
+    lag = lag_of(noisy)  # the motion explains the force below 40 Hz
     assert lag is not None
     assert lag.explained > 0.65
     assert lag_of(replace(noisy, F_t=noisy.F_t + 4.0 * slow)) is None
@@ -121,19 +121,19 @@ def test_a_very_short_trial_gives_no_lag():
     assert lag_of(series) is None
 
 
-def named(series):
+def named_doubts(series):
     return {d.name: d for d in doubts_of(prepare_trial(series, PrepareOptions()))}
 
 
 def test_a_late_force_is_reported_with_its_offset():
-    doubt = named(jamming(0.020))["lag"]
+    doubt = named_doubts(jamming(0.020))["lag"]
     assert "20 ms late" in doubt.seen
     assert "--what-if lag=20" in doubt.remedy
 
 
 @pytest.mark.parametrize("late_ms", LATE_MS)
 def test_a_force_is_doubted_at_any_searched_lag(late_ms):
-    assert f"{late_ms:.0f} ms late" in named(jamming(late_ms * 1e-3))["lag"].seen
+    assert f"{late_ms:.0f} ms late" in named_doubts(jamming(late_ms * 1e-3))["lag"].seen
 
 
 @pytest.mark.parametrize("late_ms", [1100.0, 3000.0])
@@ -151,7 +151,7 @@ def test_a_short_trial_is_searched_within_its_length(late_ms):
 
 @pytest.mark.parametrize("late_ms", [0.0, 300.0])
 def test_a_periodic_motion_gives_no_lag(late_ms):
-    """Of a foot that is shaken evenly, one period late looks like in time."""
+    """In a periodic motion a lag of one period looks like no lag."""
     t = np.arange(4000) / 500.0
     phase = 2.0 * np.pi * 15.0 * t
     late = phase - 2.0 * np.pi * 15.0 * late_ms * 1e-3
@@ -165,21 +165,21 @@ def test_a_periodic_motion_gives_no_lag(late_ms):
     assert lag_of(series) is None
 
 
-def test_an_early_force_is_doubted_too():
-    assert "early" in named(jamming(-0.015))["lag"].seen
+def test_an_early_force_is_doubted():
+    assert "early" in named_doubts(jamming(-0.015))["lag"].seen
 
 
 def test_a_force_consistent_with_its_time_stamps_is_not_doubted():
-    assert "lag" not in named(replace(jamming(0.006), stamped_lag=0.006))
-    assert "lag" in named(replace(jamming(0.0), stamped_lag=0.006))
+    assert "lag" not in named_doubts(replace(jamming(0.006), stamped_lag=0.006))
+    assert "lag" in named_doubts(replace(jamming(0.0), stamped_lag=0.006))
 
 
 def test_a_small_lag_is_not_doubted():
-    assert "lag" not in named(jamming(0.002))
+    assert "lag" not in named_doubts(jamming(0.002))
 
 
 def after_a_rest(series, F_n, F_t, seconds=1.0):
-    """Return the trial behind a time of standing with these forces [N]."""
+    """Return the trial after a rest at these forces [N]."""
     count = round(seconds * 500)
     t = np.arange(count) / 500.0
     still = np.zeros(count)
@@ -193,14 +193,14 @@ def after_a_rest(series, F_n, F_t, seconds=1.0):
 
 
 def test_resting_on_the_traction_column_indicates_swapped_columns():
-    assert "swapped" in named(after_a_rest(jamming(), F_n=0.3, F_t=3.0))
+    assert "swapped" in named_doubts(after_a_rest(jamming(), F_n=0.3, F_t=3.0))
 
 
 def test_resting_on_the_normal_force_is_not_doubted():
-    assert "swapped" not in named(after_a_rest(jamming(), F_n=3.0, F_t=1.4))
+    assert "swapped" not in named_doubts(after_a_rest(jamming(), F_n=3.0, F_t=1.4))
 
 
-def test_a_small_median_error_of_the_step_still_gives_a_lag():
+def test_jittered_time_steps_still_give_a_lag():
     series = jamming(0.004)
     t = series.t - 2e-5 * (np.arange(series.t.size) % 3 == 1)
     lag = force_lag(t, series.v_t, series.F_t)

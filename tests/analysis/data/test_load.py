@@ -38,7 +38,7 @@ ATTACHMENTS = {
 
 
 def make_cycles(count=100):
-    """Return records of an arm that moves evenly under a force that stays."""
+    """Return records of an arm that moves steadily under a constant force."""
     records = np.frombuffer(bytearray(CYCLE.template * count), CYCLE.dtype)
     records["cycle"] = np.arange(count)
     records["host_ns"] = 10**12 + 2_000_000 * np.arange(count)
@@ -133,7 +133,7 @@ def test_the_series_has_its_columns_in_order(trial):
 
 
 def test_the_calibration_in_the_file_is_used(trial, tmp_path):
-    """So a better one can be applied later."""
+    """A better calibration can be applied later."""
     untared = payload_to_toml(PAYLOAD, TOOL.sole)
     other = load_trial(write(tmp_path / "T.mcap", **{"ft_calibration.toml": untared}))
     assert np.abs(other.force - trial.force).max() > 0.3
@@ -150,12 +150,9 @@ def test_a_gap_has_no_velocity(tmp_path):
 def test_a_recovered_trial_is_loaded_as_incomplete(trial, tmp_path):
     write(tmp_path / "T.mcap", finish=False)
     loaded = load_trial(recover_file(tmp_path / "T.mcap.partial").path)
-    told = [t.metadata["result"].get("complete") for t in (trial, loaded)]
-    assert [each == "true" for each in told] == [True, False]
+    states = [t.metadata["result"].get("complete") for t in (trial, loaded)]
+    assert [state == "true" for state in states] == [True, False]
     assert loaded.force.tobytes() == trial.force.tobytes()
-
-
-# --- hostile files --------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", sorted(ATTACHMENTS))
@@ -261,7 +258,7 @@ def test_a_level_sole_has_the_terrains_axes(trial):
 
 
 def as_left(trial, name="T01", **columns):
-    """Return the trial with other facts and columns, as the rig may have left it."""
+    """Return the trial with other metadata and columns, as a rig may record it."""
     cycles = trial.cycles.copy()
     cycles["arm_ns"], cycles["ft_ns"] = cycles["host_ns"], cycles["host_ns"]
     for key, values in columns.items():
@@ -278,7 +275,7 @@ def as_left(trial, name="T01", **columns):
 
 
 def summarised(trials):
-    """Return the health of trials with what their tares tell."""
+    """Return the health of trials with the results of their tares."""
     return with_tares([health_of(trial) for trial in trials], trials)
 
 
@@ -305,9 +302,9 @@ def test_the_load_is_compared_with_its_setting(trial):
 
 
 def test_drag_is_the_power_lost_to_friction(trial):
-    one = np.zeros((trial.t.size, 7))
-    one[:, 1] = 0.1
-    (health,) = summarised([as_left(trial, velocity=one)])
+    speeds = np.zeros((trial.t.size, 7))
+    speeds[:, 1] = 0.1
+    (health,) = summarised([as_left(trial, velocity=speeds)])
     power = 0.1 * CONSTANTS.coulomb[1]
     expected = np.median(power / np.abs(trial.traction[:, 0]))
     assert health.drag == pytest.approx(expected)
@@ -331,8 +328,8 @@ def test_without_a_second_tare_the_floor_is_the_noise(trial):
 
 
 def test_the_largest_traction_follows_from_the_sensors_ranges(trial):
-    told = as_left(trial)
-    told.metadata["provenance"]["ft_sensor:ranges"] = "500 400 1200 15 12 12"
-    # 12 N m over 0.112 m of foot is what gives way first
-    assert summarised([told])[0].measurable_F_t == pytest.approx(12 / 0.112)
+    ranged = as_left(trial)
+    ranged.metadata["provenance"]["ft_sensor:ranges"] = "500 400 1200 15 12 12"
+    # 12 N m over 0.112 m of foot is reached first
+    assert summarised([ranged])[0].measurable_F_t == pytest.approx(12 / 0.112)
     assert summarised([as_left(trial)])[0].measurable_F_t is None

@@ -1,4 +1,4 @@
-"""What a file may take of the memory that is free."""
+"""The memory budget of a file is a share of the free memory."""
 
 import subprocess
 import sys
@@ -11,7 +11,7 @@ from analysis.data.memory import share_of_memory
 
 @pytest.fixture
 def computer(tmp_path, monkeypatch):
-    """Return a folder that states what is free, and what a group may take."""
+    """A folder that states the free memory and the limit of a control group."""
     monkeypatch.setattr(memory, "_MEMORY", tmp_path / "meminfo")
     monkeypatch.setattr(memory, "_GROUP", tmp_path)
     (tmp_path / "meminfo").write_text("MemTotal: 9 kB\nMemAvailable: 8000 kB\n")
@@ -23,9 +23,9 @@ def test_the_budget_is_a_share_of_free_memory_above_a_minimum(computer):
     assert share_of_memory(8, 2_000_000) == 2_000_000
 
 
-@pytest.mark.parametrize(("most", "part"), [("3000000", 250_000), ("max", 1_024_000)])
-def test_a_control_group_may_lower_the_budget(computer, most, part):
-    (computer / "memory.max").write_text(most)
+@pytest.mark.parametrize(("cap", "part"), [("3000000", 250_000), ("max", 1_024_000)])
+def test_a_control_group_may_lower_the_budget(computer, cap, part):
+    (computer / "memory.max").write_text(cap)
     (computer / "memory.current").write_text("1000000")
     assert share_of_memory(8, 10) == part
 
@@ -37,7 +37,7 @@ def test_without_information_the_budget_is_the_minimum(computer, text):
 
 
 def test_a_process_limit_may_lower_the_budget():
-    """In a process of its own: its limit would stay."""
+    """In a process of its own, as a limit cannot be raised again."""
     program = (
         "import resource\n"
         "from analysis.data.memory import share_of_memory\n"

@@ -1,4 +1,4 @@
-"""Trials that cannot be what they say: each disturbance is named with its cause."""
+"""Implausible trials are doubted, and the cause of each doubt is named."""
 
 import tarfile
 from dataclasses import replace
@@ -106,7 +106,7 @@ def kinds(recorded):
 
 
 def turned(recorded, degrees):
-    """Return the trial as a sensor that is turned about z would have shown it."""
+    """Return the trial as recorded by a sensor that is turned about z."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     v_t, F_t, F_n = recorded.traction.T
     along, across = c * F_t - s * recorded.lateral, s * F_t + c * recorded.lateral

@@ -43,12 +43,12 @@ def test_velocity_is_central_not_one_sided():
     assert foot_velocity(t, t**2)[0] == pytest.approx(0.1)
 
 
-def test_velocity_spans_three_missing_samples():
+def test_velocity_spans_a_short_gap():
     t = np.delete(np.arange(20), [8, 9, 10]) * 0.002
     assert np.all(np.isfinite(foot_velocity(t, t)))
 
 
-def test_velocity_is_missing_across_four_missing_samples():
+def test_velocity_is_missing_across_a_long_gap():
     t = np.delete(np.arange(20), [8, 9, 10, 11]) * 0.002
     velocity = foot_velocity(t, np.outer(t, [1.0, 1.0]))
     missing = np.flatnonzero(np.isnan(velocity).all(axis=1))
@@ -106,9 +106,9 @@ def test_a_trial_needs_enough_samples_and_travel(
 
 def test_travel_of_exactly_the_required_share_is_enough(make_series):
     series = make_series(np.full(2000, 0.1))
-    way = prepare_trial(series, PrepareOptions()).travel
-    near, share = way / MINIMUM_TRAVEL_SHARE, MINIMUM_TRAVEL_SHARE
-    container = next(c for c in np.nextafter(near, [near, 0, 1]) if share * c == way)
+    travel = prepare_trial(series, PrepareOptions()).travel
+    near, share = travel / MINIMUM_TRAVEL_SHARE, MINIMUM_TRAVEL_SHARE
+    container = next(c for c in np.nextafter(near, [near, 0, 1]) if share * c == travel)
     for wanted, is_countable in ((container, True), (container * (1 + 1e-9), False)):
         options = PrepareOptions(container_travel=float(wanted))
         assert prepare_trial(series, options).is_countable is is_countable

@@ -1,4 +1,4 @@
-"""The tares around a trial, in its file and in the sidecar beside it."""
+"""Tares before and after a trial are read from its file and its sidecar."""
 
 import json
 
@@ -18,7 +18,7 @@ NEXT_TARE = {"t_ns": START + 8 * 10**9, "bias": NEXT.tolist()}
 
 @pytest.fixture
 def load(tmp_path):
-    """Return a trial whose file says when it was tared, with a sidecar's text."""
+    """Load a trial that states the time of its tare, with the text of a sidecar."""
 
     def loaded(sidecar=None, fields=TARED):
         path = tmp_path / "T01.mcap"

@@ -52,7 +52,7 @@ def test_a_symmetric_kernel_has_the_same_upper_triangle(name, count):
     kernel, rng = KERNELS[name], np.random.default_rng(4)
     X, W = rng.normal(size=(count, 2)), np.triu(rng.normal(size=(count, count)))
     evaluate, whole = kernel.over(X), kernel.over(X, X)
-    for seed in range(3):  # what an earlier theta left below the diagonal is no harm
+    for seed in range(3):  # remains of an earlier theta below the diagonal do no harm
         theta = np.random.default_rng(seed).normal(0, 2.0, len(kernel.names))
         (K, contract), (expected, contract_whole) = evaluate(theta), whole(theta)
         np.testing.assert_array_equal(np.triu(K), np.triu(expected))
@@ -61,7 +61,7 @@ def test_a_symmetric_kernel_has_the_same_upper_triangle(name, count):
 
 
 @pytest.mark.parametrize("name", list(KERNELS))
-def test_variances_are_the_diagonal(rows, name):
+def test_variances_equal_the_diagonal_of_the_covariance(rows, name):
     kernel, (X, _) = KERNELS[name], rows
     theta = some_theta(kernel)
     K = kernel.matrix(theta, X, X)
@@ -99,7 +99,7 @@ def test_as_printed_the_variance_is_the_same_everywhere():
 
 
 @pytest.mark.parametrize("noise", [ConstantNoise(), LogLinearNoise(2)])
-def test_noise_gradients_contract(rows, noise):
+def test_noise_gradients_agree_with_differences(rows, noise):
     X, _ = rows
     theta = np.random.default_rng(4).normal(0, 0.3, len(noise.names))
     d = np.arange(9.0)

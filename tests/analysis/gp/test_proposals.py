@@ -1,4 +1,4 @@
-"""A kernel that says which hyperparameters it has is searched like the others."""
+"""A kernel that lists its hyperparameters is searched like the others."""
 
 from dataclasses import dataclass
 

@@ -173,7 +173,7 @@ def test_an_evaluation_keeps_no_memory(kernel):
 
 
 @pytest.mark.parametrize("kernel", [SE, Arcsine(2)])
-def test_value_alone_is_that_of_the_likelihood_with_its_gradient(kernel):
+def test_the_value_without_a_gradient_equals_that_with_one(kernel):
     X, y = draw(np.random.default_rng(2), 100)
     likelihood = Likelihood(kernel, ConstantNoise(), X, y)
     theta = np.random.default_rng(5).normal(0, 0.3, len(kernel.names) + 1)
@@ -235,7 +235,7 @@ def test_predictions_follow_a_change_of_units():
     )
 
 
-def test_noise_is_in_the_variance_only_if_asked_for():
+def test_noise_is_in_the_variance_only_if_requested():
     X, y = draw(np.random.default_rng(7), 40)
     model = fit_gp(X, y)
     _, of_function = model.predict(X, include_noise=False)
@@ -272,7 +272,7 @@ def test_an_ill_conditioned_covariance_is_refused():
         factorise(-np.eye(5), np.zeros(5))
 
 
-def test_an_input_that_does_not_vary_is_carried_along():
+def test_a_constant_input_gives_finite_variances():
     X, y = draw(np.random.default_rng(9), 40)
     X[:, 0] = 3.0
     model = fit_gp(X, y)

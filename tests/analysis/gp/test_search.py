@@ -22,7 +22,7 @@ KERNELS = {
 class Hills:
     """A likelihood with a top of given centre, height and width at every hill.
 
-    `rough` is what a part of the rows makes of it; `hole` where it has no value.
+    `rough` is the likelihood of a subset of the rows; `hole`: where it has no value.
     """
 
     kernel, noise, trials = SE, ConstantNoise(), None
@@ -58,7 +58,7 @@ def test_a_search_starts_at_the_best_point_on_a_subset():
 def test_a_move_finds_an_optimum_that_the_first_start_misses():
     low = np.array([0.0, -1.0, 0.5, -0.5])
     high = low + np.array([0.0, 0.0, 2.5, 0.0])  # one length apart
-    # all that a part of the rows knows of is the lower top
+    # a subset of the rows shows only the lower top
     both = Hills((low, 5.0, 0.6), (high, 9.0, 0.6), rough=Hills((low, 5.0, 0.6)))
     optimum = maximise_posterior(both)
     np.testing.assert_allclose(optimum.theta[1:3], high[1:3], atol=0.1)
@@ -67,7 +67,7 @@ def test_a_move_finds_an_optimum_that_the_first_start_misses():
 
 
 @pytest.mark.parametrize("length", [0.5, 5.5])
-def test_a_move_is_far_from_known_optima(length):
+def test_a_new_start_is_far_from_known_optima(length):
     search = Search(Hills((np.array([0.0, -1.0, length, -0.5]), 5.0, 3.0)))
     search.climb(search.designed_start())
     search.move()
@@ -155,7 +155,7 @@ def test_an_input_that_does_not_vary_is_searched():
 
 
 def test_an_input_with_a_long_length_is_tried_as_inactive():
-    """On a trend the best top may lie where the length is endless."""
+    """For a trend the best optimum may be at an infinite length."""
     low = np.array([0.0, -1.0, 1.5, -0.5])
     bound = bounds(SE, 1.0, ROWS.std(axis=0))[2, 1]
     high = np.array([0.0, -1.0, bound, -0.5])

@@ -1,4 +1,4 @@
-"""How much trials differ in level, from residuals whose making is known."""
+"""The spread of trial levels is estimated from residuals of a known process."""
 
 import numpy as np
 import pytest
@@ -55,7 +55,7 @@ def test_correlated_residuals_are_not_mistaken_for_trial_spread():
     assert np.mean(found) < 0.35
 
 
-def test_sums_without_a_trial_are_those_of_the_others():
+def test_sums_without_a_trial_equal_those_of_the_others():
     trials = drawn(6, 1.0)
     sums = LevelSums.of(TrialResiduals(trials), 1.5)
     for k, found in enumerate(sums.without_each()):

@@ -1,4 +1,4 @@
-"""What rows of one trial share: against differences, closed form, scikit-learn."""
+"""The effect of a trial agrees with differences, a closed form and scikit-learn."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ CHANGING = TrialNoise(LogLinearNoise(2))
 
 
 def drawn(trials, rows, seed=0):
-    """Return inputs, outputs and trials of so many rows of each of the trials."""
+    """Return inputs, outputs and trials, `rows` rows of each trial."""
     rng = np.random.default_rng(seed)
     X, y = rng.normal(size=(trials * rows, 2)), rng.normal(size=trials * rows)
     return X, y, TrialRows(np.repeat(np.arange(trials), rows))
@@ -121,7 +121,7 @@ def test_unnamed_trials_share_no_effect():
     assert Likelihood(SE, LEVEL, X, y).value(named) == pytest.approx(alone)
 
 
-def test_other_outputs_are_fitted_from_the_first_optimum():
+def test_a_refit_with_other_outputs_equals_a_new_fit():
     X, _, trials = drawn(8, 20, seed=6)
     rng = np.random.default_rng(7)
     y = 5.0 + np.sin(X[:, 0]) + rng.normal(0, 0.4, 160)

@@ -1,6 +1,6 @@
-"""A robot of four joints that rubs a foot over the ground, with its truth, as a log.
+"""Logs of a robot of four joints that rubs a foot over the ground, and their truth.
 
-Written by another program's library (rosbags), so that readers are held against it.
+Written by another program's library (rosbags), so that readers are tested against it.
 """
 
 from dataclasses import dataclass, field
@@ -42,7 +42,7 @@ URDF = """<?xml version="1.0"?>
 
 @dataclass
 class Rubbing:
-    """What happens, and how it is recorded.
+    """A motion of the robot, and how it is recorded.
 
     Attributes:
         lag: how late the wrench is stamped [s].
@@ -52,8 +52,8 @@ class Rubbing:
         bias: of the sensor.
         sign: -1 where it reads the reaction.
         strokes: number of them, each lifted at its end.
-        slope: of the ground along the way [rad].
-        heading: of the way about z [rad].
+        slope: of the ground along the path [rad].
+        heading: of the path about z [rad].
     """
 
     lag: float = 0.010
@@ -88,7 +88,7 @@ class Rubbing:
 
     # the motion: in the air to 2 s, down to 3 s, then strokes of 8 s, each lifted 1 s
     def speed(self, t):
-        """Return the speed along the way [m/s]."""
+        """Return the speed along the path [m/s]."""
         s = t - 3.0
         inside = (s >= 0.5) & (s % 9.0 > 0.5) & (s % 9.0 < 7.9)
         return np.where(inside, 0.06 * np.clip(np.sin(2 * np.pi * s / 1.5), 0, 1), 0.0)
@@ -114,7 +114,7 @@ class Rubbing:
         F_n = np.where(on, 10.0 + 2.0 * np.sin(2 * np.pi * 0.7 * t), 0.0)
         return v, np.where(v > 0, 0.6, 0.25) * F_n, F_n
 
-    def way(self, t):
+    def travel(self, t):
         grid = np.arange(0.0, self.end + 0.01, 1e-3)
         steps = self.speed(grid) * 1e-3
         return np.interp(t, grid, np.cumsum(steps) - steps)
@@ -127,7 +127,7 @@ class Rubbing:
         wrist = self.turn * np.clip(t - 0.7, 0, 0.2) / 0.2
         wrist = wrist * (1 - np.clip(t - 1.8, 0, 0.2) / 0.2)
         wrist = wrist + self.tilt * np.clip(t - 3.0, 0, 8.0) / 8.0
-        foot = self.way(t)[:, None] * axes[0] + self.lifted(t)[:, None] * axes[2]
+        foot = self.travel(t)[:, None] * axes[0] + self.lifted(t)[:, None] * axes[2]
         at = Rotation.from_euler("x", wrist[:, None]).apply([0.0, 0.0, -0.07])
         q = np.column_stack([foot - at, wrist])
         return np.round(q / self.q_step) * self.q_step
@@ -140,7 +140,7 @@ class Rubbing:
         return (Rotation.from_euler("x", wrist[:, None]) * mount).as_matrix()
 
     def wrench(self, t):
-        """Return what the sensor shows, shape (n, 6)."""
+        """Return the readings of the sensor, shape (n, 6)."""
         rng = np.random.default_rng(self.seed)
         _, F_t, F_n = self.truth(t)
         axes = self.axes_of_ground()
@@ -156,7 +156,7 @@ class Rubbing:
 
 
 def stated(rubbing: Rubbing, log: Path, urdf: Path, **options) -> ImportRequest:
-    """Return a request that states the truth of a log, but for `options`."""
+    """Return a request that states the truth of a log, except for `options`."""
     x_T, _, z_T = rubbing.axes_of_ground()
     starts = [3.0 + 9.0 * k for k in range(rubbing.strokes)]
     values = {
@@ -180,7 +180,7 @@ def write_urdf(folder: Path) -> Path:
 
 
 def messages(rubbing: Rubbing, store, types):
-    """Give (topic, receipt [ns], message) in order of receipt."""
+    """Return (topic, receipt [ns], message) in order of receipt."""
     rng = np.random.default_rng(rubbing.seed + 1)
     Header, Time, JointState, WrenchStamped, Wrench, Vector3 = types
     is_ros1 = "seq" in Header.__dataclass_fields__

@@ -1,4 +1,4 @@
-"""The sentences by which the room of logs refuses, read from its source."""
+"""Sentences of all refusals in analysis.logs, read from their source."""
 
 import ast
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ LOGS = Path(analysis.logs.__path__[0])
 
 
 def template(node: ast.expr) -> str:
-    """Return a sentence with {} for what is filled in."""
+    """Return a sentence with {} for each value."""
     if isinstance(node, ast.Constant):
         return str(node.value)
     if isinstance(node, ast.JoinedStr):
@@ -25,7 +25,7 @@ def template(node: ast.expr) -> str:
 
 
 def sentences() -> Iterator[tuple[str, str]]:
-    """Give (module, sentence) of every refusal."""
+    """Yield (module, sentence) of every refusal."""
     for path in sorted(LOGS.glob("*.py")):
         for node in ast.walk(ast.parse(path.read_text())):
             if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):

@@ -1,4 +1,4 @@
-"""Messages that cannot be used are counted and named, and nothing is repaired."""
+"""Unusable messages are counted and named, never repaired."""
 
 import sqlite3
 
@@ -48,8 +48,6 @@ def worst_F_n(found, rubbing):
 
 
 def test_nan_velocities_leave_positions_usable(imported):
-    """It was "0 usable messages of 6000"."""
-
     def change(_, message):
         message.velocity[:] = np.nan
 
@@ -62,8 +60,6 @@ def test_nan_velocities_leave_positions_usable(imported):
 
 @pytest.mark.parametrize("rows", [(3100,), (3100, 3101, 4000)])
 def test_joint_states_of_zeros_are_reported_and_omitted(imported, rows):
-    """One of 6000 was "a wall. Check the tare"."""
-
     def change(count, message):
         if count in rows:
             message.position[:] = 0.0
@@ -102,7 +98,6 @@ def test_a_jump_of_a_joint_is_refused_with_its_time(imported):
 
 
 def test_a_constant_channel_is_omitted_and_reported(imported):
-    """2.5 s of it moved F_t by 1.7 N without a word."""
     held = []
 
     def change(count, message):
@@ -145,12 +140,8 @@ def test_without_usable_messages_the_causes_are_counted(imported):
         imported(rubbing)
 
 
-# --- the same recording twice, and databases with companions --------------------------
-
-
 @pytest.mark.parametrize("clock", [None, "receipt"])
 def test_a_duplicated_recording_is_reported(imported, tmp_path, clock):
-    """It was "times do not increase. Record it again"."""
     imported(Rubbing())
     (file,) = (tmp_path / "log").glob("*.mcap")
     file.with_name("copy.mcap").write_bytes(file.read_bytes())

@@ -1,4 +1,4 @@
-"""Two clocks in a log: named, refused without a statement, and right with one."""
+"""Two clocks in a log are refused unless one is stated, and then read correctly."""
 
 from dataclasses import replace
 
@@ -30,7 +30,6 @@ def fastest(found):
 
 @pytest.mark.parametrize("rate", [0.5, 0.8, 2.0])
 def test_stamps_at_another_rate_are_refused_until_a_clock_is_stated(imported, rate):
-    """v_t of 0.060 m/s was 0.030, 0.048 and 0.120 without a word."""
     rubbing = Rubbing(stamp_rate=rate)
     with pytest.raises(SettingsError, match=rf"run at {rate:g} times") as error:
         imported(rubbing)
@@ -120,8 +119,8 @@ def test_a_few_messages_without_a_stamp_are_omitted(imported, clock):
         return rows
 
     found = imported(Rubbing(changes=(change,)), clock=clock)
-    left_out = [each.clock.left_out for each in (found.joints, found.wrench)]
-    assert sum(each.get("without a stamp", 0) for each in left_out) == 3
+    left_out = [topic.clock.left_out for topic in (found.joints, found.wrench)]
+    assert sum(counts.get("without a stamp", 0) for counts in left_out) == 3
 
 
 def times(*, drift=0.0, step=0.0, stall=0.0, seed=1):
@@ -134,7 +133,7 @@ def times(*, drift=0.0, step=0.0, stall=0.0, seed=1):
     return (np.rint(x * 1e9).astype(np.int64) + 10**18 for x in (stamps, received))
 
 
-def test_delays_alone_raise_no_doubt():
+def test_delayed_messages_raise_no_doubt_of_the_clock():
     for seed in range(5):
         fit = fit_clock(*times(seed=seed, stall=0.1, drift=20e-6))
         assert doubts_of_clock("/a", fit) == []

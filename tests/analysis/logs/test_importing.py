@@ -1,4 +1,4 @@
-"""A log of a robot whose truth is known: what is stated, checked and refused."""
+"""Statements about a log of known truth are applied, checked or refused."""
 
 import numpy as np
 import pytest
@@ -37,8 +37,8 @@ def imported(tmp_path, written):
 
 
 def check(found, name):
-    (one,) = (each for each in found.checks if each.name == name)
-    return one
+    (match,) = (row for row in found.checks if row.name == name)
+    return match
 
 
 def errors(trial, rubbing):
@@ -80,7 +80,7 @@ def test_checks_confirm_correct_statements(imported):
     assert check(found, "normal").shown == pytest.approx(z_T, abs=2e-3)
     assert check(found, "direction").shown == pytest.approx(x_T, abs=2e-3)
     assert check(found, "clocks apart").shown == pytest.approx([9.4], abs=0.5)
-    assert not any(each.warning for each in found.checks)
+    assert not any(row.warning for row in found.checks)
 
 
 @pytest.mark.parametrize(
@@ -134,7 +134,6 @@ def test_a_lag_of_a_smooth_push_is_not_claimed(imported):
 
 @pytest.mark.slow
 def test_unexplained_onsets_are_counted(imported):
-    """They used to be "too few starts and stops"."""
     rubbing = Rubbing(strokes=3)
     rubbing.truth = lambda t: (
         rubbing.speed(t),
@@ -146,7 +145,7 @@ def test_unexplained_onsets_are_counted(imported):
     assert "% are needed" in how
 
 
-def test_the_other_sign_is_refused_with_the_remedy(imported):
+def test_forces_of_the_opposite_sign_are_refused_with_the_remedy(imported):
     with pytest.raises(SettingsError, match="have the opposite sign") as error:
         imported(Rubbing(), acts="foot-on-ground")
     assert "Give the other --acts" in error.value.hint
@@ -162,12 +161,12 @@ def test_a_reaction_force_sensor_is_read_with_the_matching_option(imported):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("axes", "said"),
+    ("axes", "words"),
     [((1, 0, 2), "moments are -1.0 times"), ((2, 1, 0), "F_t exceeds F_n")],
 )
-def test_exchanged_axes_are_named(imported, axes, said):
+def test_exchanged_axes_are_named(imported, axes, words):
     found = imported(Rubbing(axes=axes))
-    assert any(said in text for text in found.warnings)
+    assert any(words in text for text in found.warnings)
 
 
 def test_a_missing_weight_is_reported_with_its_effect(imported):

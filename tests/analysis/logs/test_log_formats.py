@@ -1,4 +1,4 @@
-"""Logs that another library wrote are read whole; cut and packed ones within bounds."""
+"""Logs of another library are read whole, damaged and packed ones within bounds."""
 
 import sqlite3
 

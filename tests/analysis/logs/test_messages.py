@@ -1,4 +1,4 @@
-"""Both messages of an import, against another library, and hostile bytes."""
+"""Both messages of an import agree with another library; hostile bytes are refused."""
 
 import numpy as np
 import pytest
@@ -53,7 +53,7 @@ def test_messages_of_another_library_round_trip(release, serialization):
     ],
 )
 @pytest.mark.parametrize("serialization", ["cdr", "ros1"])
-def test_an_absurd_message_is_refused(data, serialization):
+def test_an_invalid_message_is_refused(data, serialization):
     with pytest.raises(MessageError):
         read_wrench(data, serialization)
     with pytest.raises(MessageError):

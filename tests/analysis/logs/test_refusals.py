@@ -1,4 +1,4 @@
-"""Every sentence by which an import refuses, and what establishes it."""
+"""Every refusal of an import is listed with the observation that establishes it."""
 
 from tests.analysis.logs.refusals import sentences
 
@@ -124,13 +124,13 @@ ESTABLISHED_BY = {
 
 
 def test_every_refusal_states_its_observation():
-    listed = {(m, said) for m, rows in ESTABLISHED_BY.items() for said in rows}
+    listed = {(m, text) for m, rows in ESTABLISHED_BY.items() for text in rows}
     assert {*sentences()} == listed
     assert all(seen for rows in ESTABLISHED_BY.values() for seen in rows.values())
 
 
-def test_no_sentence_guesses():
-    """A cause that is one of several is no cause."""
-    for module, said in sentences():
+def test_no_refusal_guesses_its_cause():
+    """One of several possible causes is not stated as the cause."""
+    for module, text in sentences():
         for word in ("probably", "perhaps", "likely", "maybe", "must be"):
-            assert word not in said, f"{module}: {said}"
+            assert word not in text, f"{module}: {text}"

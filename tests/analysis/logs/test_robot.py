@@ -1,4 +1,4 @@
-"""Kinematics of a URDF: against the arm's own model, and hostile files."""
+"""Kinematics of a URDF agree with the arm model; hostile files are refused."""
 
 from pathlib import Path
 
@@ -127,7 +127,6 @@ SHAPES = {
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_common_urdfs_have_a_foot(name):
-    """A URDF of one joint was a traceback, a comment a xacro."""
     leg = RobotLeg(parse_urdf(NOWHERE, SHAPES[name]), "b", "b")
     assert leg.joints == ["j"]
     path = leg.along(np.array([[0.1], [4.0]]), np.array([[0.5], [0.5]]))

@@ -27,7 +27,7 @@ def store(tmp_path):
 
 @pytest.fixture
 def drawings(monkeypatch):
-    """Return what was drawn; every time it is one figure."""
+    """A list of all that was drawn; each drawing is one figure."""
     drawn = []
 
     @wraps(drawing.report_figures)  # pictures are kept by its module and name
@@ -72,7 +72,7 @@ def test_an_invalid_stored_figure_is_drawn_again(store, drawings):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)  # two processes beside others on a busy machine
+@pytest.mark.timeout(300)  # two processes alongside others on a busy machine
 def test_pictures_are_the_same_from_two_processes(small_study):
     shown, keys = ShownNumbers(compute_results(small_study)), tuple(FIGURES)[::4]
     shares = [FigureTask(shown, keys[k::2]) for k in range(2)]

@@ -1,4 +1,4 @@
-"""What the tares of a session say of the forces, against errors that are known."""
+"""The tares of a session predict the known errors of its forces."""
 
 from types import SimpleNamespace
 
@@ -36,12 +36,12 @@ def wandering(time):
 
 
 def steady(noise):
-    """A zero that never comes back: a random walk."""
+    """A zero that drifts as a random walk."""
     return 0.02 * np.cumsum(noise, axis=1)
 
 
 def errors(zero):
-    """Return what a sample and a trial's mean are off, by either zero, as rms [N]."""
+    """Return the rms errors of samples and trial means with either zero [N]."""
     trials = zero.reshape(len(zero), 11, EVERY)
     tares = trials[:, :, :TARE].mean(axis=2)
     inside = trials[:, :-1, FIRST:LAST]
@@ -79,7 +79,7 @@ def test_a_steady_wander_is_overestimated_at_most_twofold(kind):
 
 
 def trial(bias, change=None, session="S001"):
-    """A trial as far as its tares go."""
+    """A trial with nothing but its tares."""
     bracket = None
     if change is not None:
         biases = np.stack([np.full(6, bias), np.full(6, bias + change)])

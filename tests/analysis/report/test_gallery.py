@@ -16,7 +16,7 @@ MARGIN = 0.02  # inches: half a line that lies on the edge
 
 @pytest.fixture(scope="module")
 def findings(small_study, slice_trials):
-    """Return what is shown of three terrains, and of one alone."""
+    """The results of three terrains, and of one alone."""
     options = StudyOptions(fit=FitOptions(gp_points=80), n_jobs=1)
     alone = run_study({"TF": slice_trials["TF"]}, options, simulated=True)
     return {"three": compute_results(small_study), "one": compute_results(alone)}

@@ -1,4 +1,4 @@
-"""The report as a reader opens it: in headless Chromium, on the screen and in print."""
+"""The report is readable in headless Chromium, on the screen and in print."""
 
 import json
 import re
@@ -26,7 +26,7 @@ pytestmark = [
     pytest.mark.timeout(900),
     pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine"),
 ]
-WIDTHS = (1600, 800, 500)  # of a desk and down to the narrowest window it opens
+WIDTHS = (1600, 800, 500)  # of a desktop and down to the narrowest window that opens
 _BROWSER = "not an origin"
 PROBE = """<script>
 addEventListener("load", () => {
@@ -86,15 +86,15 @@ addEventListener("load", () => {
 
 @dataclass(frozen=True)
 class Opened:
-    """What a browser said of a page, and what the page asked for."""
+    """The output of a browser for a page, and the addresses the page requested."""
 
     out: str
     console: list[str]
-    asked: set[str]
+    urls: set[str]
 
 
 def open_page(page: Path, folder: Path, *options: str) -> Opened:
-    """Open a page headless and return what happened."""
+    """Open a page headless and return its events."""
     log = folder / "net.json"
     command = [
         *(CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run"),
@@ -105,23 +105,23 @@ def open_page(page: Path, folder: Path, *options: str) -> Opened:
         *("--hide-scrollbars", *options, page.as_uri()),
     ]
     done = subprocess.run(command, capture_output=True, check=True, timeout=300)
-    said = done.stderr.decode(errors="replace").splitlines()
+    lines = done.stderr.decode(errors="replace").splitlines()
     params = [
         event.get("params", {}) for event in json.loads(log.read_text())["events"]
     ]
-    # what the browser itself asks for has no page as its origin
-    asked = {
+    # requests of the browser itself have no page as their origin
+    urls = {
         p["url"]
         for p in params
         if "url" in p and p.get("initiator", _BROWSER) != _BROWSER
     }
     return Opened(
-        done.stdout.decode(), [line for line in said if "CONSOLE" in line], asked
+        done.stdout.decode(), [line for line in lines if "CONSOLE" in line], urls
     )
 
 
 def probe(page: Path, folder: Path, width: int, script: str = PROBE) -> dict:
-    """Return what a script in a copy of the page finds there."""
+    """Return the result of a script that is run in a copy of the page."""
     copy = folder / "probe.html"
     copy.write_text(page.read_text().replace("</body>", script + "</body>"))
     opened = open_page(copy, folder, f"--window-size={width},2000", "--dump-dom")
@@ -131,7 +131,7 @@ def probe(page: Path, folder: Path, width: int, script: str = PROBE) -> dict:
 
 
 def assert_readable(page: Path, folder: Path, least: int) -> None:
-    """Fail unless the page shows everything, asks for nothing, and prints."""
+    """Fail unless the page shows everything, requests nothing, and prints."""
     for width in WIDTHS:
         found = probe(page, folder, width)
         assert found.pop("figures") >= least
@@ -146,7 +146,7 @@ def assert_readable(page: Path, folder: Path, least: int) -> None:
     )
     for opened in (screen, paper):
         assert opened.console == []
-        assert opened.asked == set()
+        assert opened.urls == set()
     assert picture.stat().st_size > 100_000
     pages = len(re.findall(rb"/Type\s*/Page\b", printed.read_bytes()))
     assert pages > least // 3
@@ -212,7 +212,7 @@ def test_a_page_with_requests_or_errors_is_detected(tmp_path):
         '<script>console.error("alas")</script></body>'
     )
     opened = open_page(page, tmp_path, "--dump-dom")
-    assert opened.asked == {"http://127.0.0.1:9/a.png"}
+    assert opened.urls == {"http://127.0.0.1:9/a.png"}
     assert "alas" in opened.console[0]
 
 

@@ -88,7 +88,7 @@ def test_the_page_needs_no_external_resource(written):
         assert attrs["href"].startswith(("#", "../figures/"))
 
 
-def test_some_figures_are_drawings_whose_axes_are_known(written):
+def test_three_figures_are_drawings_with_stated_axes(written):
     _, _, page = written
     labels = [a["aria-label"] for a in page.attributes("div") if "aria-label" in a]
     drawings = [a for a in page.attributes("svg") if "data-axes" in a]
@@ -246,9 +246,9 @@ def test_the_excerpt_contains_slips_if_there_are_any(small_study):
 def test_the_excerpt_contains_bounce_backs_if_there_are_any(small_study):
     for name in ("S0", "B0"):
         result = small_study.terrains[name]
-        most = max(sum(s.has_bounce for s in trial) for trial in result.slips)
+        largest = max(sum(s.has_bounce for s in trial) for trial in result.slips)
         shown = sum(slip.has_bounce for slip in busiest_window(result).slips)
-        assert most >= 1
+        assert largest >= 1
         assert shown >= 1
 
 

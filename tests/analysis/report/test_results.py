@@ -1,4 +1,4 @@
-"""What a report computes beyond the models: trends, residuals, surfaces, coverage."""
+"""Results of a report beyond the models: trends, residuals, surfaces, coverage."""
 
 import csv
 import io
@@ -59,14 +59,14 @@ def test_trends_count_only_trials_with_samples(make_series, moving):
 def test_residuals_average_to_their_bias(small_study):
     result = small_study.terrains["S0"]
     band = residual_band(result, GP_SE)
-    rest = np.concatenate(
+    residual = np.concatenate(
         [
             trial.F_t - fold.models[GP_SE].model.mean(trial.F_n, trial.v_t)
             for fold, trial in zip(result.folds, result.trials, strict=True)
         ]
     )
-    assert band.bias == pytest.approx(rest.mean())
-    assert band.sd == pytest.approx(rest.std())
+    assert band.bias == pytest.approx(residual.mean())
+    assert band.sd == pytest.approx(residual.std())
     assert (np.diff(band.quantiles, axis=0) > 0).all()
 
 
@@ -76,13 +76,13 @@ def test_a_coverage_map_counts_every_sample_once(small_study):
         assert cells.counts.sum() + cells.outside == kept
 
 
-def test_surfaces_are_what_the_model_predicts(results, small_study):
+def test_surfaces_equal_the_predictions_of_the_model(results, small_study):
     surface = results.surfaces[0]
     model = small_study.terrains[surface.terrain].models(GP_SE)[0].model
     i, j = 7, 30
-    one = model.predict(results.axes.F_n[[i]], results.axes.v_t[[j]])
-    assert surface.mean[i, j] == pytest.approx(one.mean[0])
-    assert surface.variance[i, j] == pytest.approx(one.sd[0] ** 2)
+    prediction = model.predict(results.axes.F_n[[i]], results.axes.v_t[[j]])
+    assert surface.mean[i, j] == pytest.approx(prediction.mean[0])
+    assert surface.variance[i, j] == pytest.approx(prediction.sd[0] ** 2)
 
 
 def test_travelled_distance_is_the_integral_of_velocity(small_study):

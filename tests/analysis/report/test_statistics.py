@@ -1,4 +1,4 @@
-"""What tables of a report say about the uncertainty of their numbers."""
+"""Tables of a report state the uncertainty of their numbers."""
 
 import re
 from dataclasses import replace
@@ -41,7 +41,7 @@ def test_a_paired_p_value_is_shown_with_the_adjusted_one():
 def test_the_note_states_the_number_of_comparisons(small_study):
     table = paired_table(small_study, "mae", "N")
     count = sum(text.count("Holm") for row in table.rows for text in row[1:])
-    assert count == 3 * 4  # terrains, models beside the first
+    assert count == 3 * 4  # terrains, models after the first
     assert f" {count} comparisons" in table.note
 
 

@@ -1,4 +1,4 @@
-"""A figure does not depend on the backend and the style that its user has set."""
+"""A figure does not depend on the backend or the style of its user."""
 
 import os
 import subprocess

@@ -95,9 +95,9 @@ def test_a_task_that_kills_its_workers_is_reported_at_once():
         dask.config.set(quick),
         LocalCluster(n_workers=2, threads_per_worker=1, **local) as cluster,
     ):
-        where = Workers(scheduler=cluster.scheduler_address)
+        workers = Workers(scheduler=cluster.scheduler_address)
         with pytest.raises(WorkerLostError, match="ended unexpectedly"):
-            run_tasks(end_at_three, [1, 2, 3, 4, 5], where)
+            run_tasks(end_at_three, [1, 2, 3, 4, 5], workers)
 
 
 @pytest.mark.parametrize(

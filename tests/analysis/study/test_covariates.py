@@ -1,4 +1,4 @@
-"""What a further column tells of F_t, on ground whose answer is known."""
+"""The gain by a further column is recovered on simulated ground."""
 
 from dataclasses import replace
 
@@ -55,7 +55,7 @@ def results():
     names = ("moisture", "idle", "tilt")
     rows = {"X": [CovariateRows.of(trial, names, 1.5) for trial in trials_of()]}
     found = covariate_results(rows, names, FitOptions(gp_points=120), 1)
-    return {one.column: one for one in found}
+    return {result.column: result for result in found}
 
 
 @pytest.mark.slow
@@ -100,7 +100,7 @@ def test_a_gain_must_be_significant_and_not_tiny(gain, lower, verdict):
     assert CovariateResult("X", "c", 9, gain, lower, 0.5, 0.1).verdict == verdict
 
 
-def test_two_trials_are_too_few():
+def test_two_trials_are_too_few_for_a_comparison():
     rows = {"X": [CovariateRows.of(trial, ("idle",), 1.5) for trial in trials_of(2)]}
     assert covariate_results(rows, ("idle",), FitOptions(), 1) == []
 
@@ -137,11 +137,11 @@ def test_travel_since_a_drop_begins_at_the_drop():
     F_t[70:] += np.linspace(0, 0.5, 30)  # no drop follows
     series = TractionSeries("X", "x", t, np.full(100, 0.1), np.ones(100), F_t)
     trial = prepare_trial(series, replace(AS_THEY_ARE, downsample=1))
-    way = travel_since_drop(trial, 1.5)
+    travel = travel_since_drop(trial, 1.5)
     known = int(np.argmax((np.arange(100) > 49) & (F_t <= 2.5)))
-    assert way[known] == pytest.approx(0.0, abs=1e-12)
-    assert way[known - 1] == pytest.approx(0.001 * (known - 1))
-    assert way[-1] == pytest.approx(0.001 * (99 - known))
+    assert travel[known] == pytest.approx(0.0, abs=1e-12)
+    assert travel[known - 1] == pytest.approx(0.001 * (known - 1))
+    assert travel[-1] == pytest.approx(0.001 * (99 - known))
 
 
 def test_travel_is_a_column_of_any_trial():

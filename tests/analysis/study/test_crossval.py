@@ -139,14 +139,14 @@ def test_scores_of_a_fold_are_those_of_its_model_on_the_unseen_trial(trials):
     foreign = [rows for (rows,) in task.others.values()]
     (own,) = task.test_trials
     tested = SampleTable.joined([task.training, *foreign])
-    where = tested.count - foreign[-1].count
+    start = tested.count - foreign[-1].count
     assert list(task.others)[-1] == "TF"
     for name in (TUSTIN, GP_SE):
         fold = result.models[name]
         mean = fold.model.mean(own.F_n, own.v_t)
         assert fold.score.mae == np.mean(np.abs(own.F_t - mean))
         # in the same blocks of rows: in others the last digit may differ
-        there = fold.model.mean(tested.F_n, tested.v_t)[where:]
+        there = fold.model.mean(tested.F_n, tested.v_t)[start:]
         assert fold.cross["TF"] == (np.mean(np.abs(foreign[-1].F_t - there)),)
 
 
@@ -173,7 +173,7 @@ def test_one_trial_cannot_be_left_out_and_the_notes_say_so(trials):
     assert any("S0: 1 trial" in note for note in notes)
 
 
-def test_two_trials_are_enough(trials):
+def test_two_trials_are_enough_for_folds(trials):
     tasks, notes = plan_folds({"S0": trials["S0"][:2]}, FitOptions())
     assert len(tasks) == 2
     assert notes == []
@@ -209,7 +209,7 @@ def counted(name, kept, seed):
 
 
 def many(trials):
-    """Return so many trials on eight terrains."""
+    """Return `trials` trials on eight terrains."""
     return {
         terrain: [counted(f"T{k}", 50, (k, j)) for k in range(trials // 8)]
         for j, terrain in enumerate("ABCDEFGH")

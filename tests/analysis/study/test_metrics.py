@@ -10,7 +10,7 @@ from analysis.study.metrics import (
 )
 
 
-def test_errors_of_known_predictions():
+def test_errors_of_known_predictions_are_exact():
     found = score(
         np.array([1.0, 2.0, 6.0]),
         Prediction(np.array([0.0, 2.0, 2.0]), np.array([1.0, 2.0, 3.0])),
@@ -59,7 +59,7 @@ def test_the_crps_of_a_certain_prediction_is_its_error():
     assert ranked_probability(np.array([3.0]), sure)[0] == pytest.approx(2.0)
 
 
-def test_coverage_of_a_normal_sample():
+def test_a_95_percent_band_covers_95_percent_of_a_normal_sample():
     y = np.random.default_rng(0).normal(size=20_000)
     found = score(y, Prediction(np.zeros(y.size), np.ones(y.size)))
     # three binomial standard deviations of 20,000 samples are 0.0046

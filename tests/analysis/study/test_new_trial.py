@@ -1,4 +1,4 @@
-"""Models of a new trial: what residuals they keep, and whether their bands hold."""
+"""Models of a new trial keep the shape of residuals and have calibrated bands."""
 
 import numpy as np
 import pytest
@@ -145,5 +145,5 @@ def test_held_out_squares_are_split_into_residuals_and_levels():
     model = NewTrialFit(training(trials, 240), None).fit(SE)
     means = [trial.F_t.mean() - 0.5 * trial.F_n.mean() for trial in trials]
     assert model.level_sd == pytest.approx(np.std(means, ddof=1), rel=0.2)
-    # what is left around the levels is the noise of single rows
+    # the residual around the levels is the noise of single rows
     assert np.ptp(model.residuals) == pytest.approx(2 * 2.33, rel=0.15)

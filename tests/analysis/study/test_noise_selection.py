@@ -61,7 +61,7 @@ def test_inner_fits_start_only_at_the_best_optimum(monkeypatch):
     rows = data.subset
     constant = fit_gp(rows.inputs, rows.F_t)
     (best,) = (top for top in constant.starts if top.lml == constant.lml)
-    # another top, 1 nat lower: near enough to be begun with in other refits
+    # another top, 1 nat lower: near enough to be a start of other refits
     lower = best._replace(theta=tuple(x + 2.0 for x in best.theta), lml=best.lml - 1.0)
     begun = []
 

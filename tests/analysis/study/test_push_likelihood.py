@@ -1,4 +1,4 @@
-"""The likelihood against scipy's censored fits, quadrature and differences."""
+"""The likelihood agrees with SciPy's censored fits, quadrature and differences."""
 
 import numpy as np
 import pytest
@@ -118,9 +118,6 @@ def test_known_parameters_are_recovered_through_censoring():
     assert slope == pytest.approx(0.4, abs=0.09)
     assert np.exp(log_s) == pytest.approx(1.0 / 3.0, abs=0.03)
     assert np.exp(log_su) < 0.1
-
-
-# --- Kaplan and Meier -----------------------------------------------------------------
 
 
 def test_the_survival_curve_agrees_with_an_independent_one():

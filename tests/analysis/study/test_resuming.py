@@ -1,4 +1,4 @@
-"""A study that was killed goes on with what it has kept."""
+"""A killed study resumes from its stored results."""
 
 import os
 import signal
@@ -18,31 +18,31 @@ ROOT = Path(__file__).parents[3]
 OPTIONS = StudyOptions(
     fit=FitOptions(gp_points=60, models=(TUSTIN, GP_SE_TRIAL), draws=2), n_jobs=1
 )
-# Says when a result is kept, and then takes the next one.
+# Reports each stored result, and waits for a line before the next one.
 STUDY = """import sys
 from pathlib import Path
 from analysis.study.store import ResultStore
 from analysis.study.study import run_study
 from tests.analysis.study.test_resuming import OPTIONS, made_trials
 
-def told(done, total):
+def report(done, total):
     print(done, total, flush=True)
     sys.stdin.readline()
 
-run_study(made_trials(4), OPTIONS, True, told, ResultStore(Path(sys.argv[1])))
+run_study(made_trials(4), OPTIONS, True, report, ResultStore(Path(sys.argv[1])))
 """
 
 
 def made_trials(count):
-    found = []
+    trials = []
     for k in range(count):
         rng = np.random.default_rng(k)
         t = 0.002 * np.arange(3000.0)
         v_t = 0.06 + 0.05 * np.sin(3.0 * t + k)
         F_n = 4.0 + 2.0 * np.sin(2.0 * t + 2 * k)
         F_t = 0.6 * F_n + 0.3 * k + rng.normal(0, 0.3, t.size)
-        found.append(TractionSeries("S0", f"T{k}", t, v_t, F_n, F_t))
-    return {"S0": found}
+        trials.append(TractionSeries("S0", f"T{k}", t, v_t, F_n, F_t))
+    return {"S0": trials}
 
 
 def started(folder):
@@ -76,7 +76,7 @@ def test_a_resumed_study_equals_an_uninterrupted_one(tmp_path):
     kept = contents(resumed)
     with started(resumed) as study:
         seen, _ = study.communicate("\n" * 20)
-    assert seen.split()[0] == str(len(kept))  # found at once, in one word of progress
+    assert seen.split()[0] == str(len(kept))  # loaded at once, with one progress report
     run_study(made_trials(4), OPTIONS, True, store=ResultStore(alone))
     assert kept.items() < contents(resumed).items()
     assert contents(resumed) == contents(alone)

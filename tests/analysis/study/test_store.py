@@ -48,7 +48,7 @@ def result(task):
 @given(ANY)
 def test_plain_values_round_trip_exactly(value):
     plain = json.loads(json.dumps(encode(value), allow_nan=False))
-    # repr tells -0.0 and nan, which == does not
+    # repr distinguishes -0.0 and nan, which == does not
     assert repr(decode(plain)) == repr(value)
 
 
@@ -170,9 +170,9 @@ def test_different_values_have_different_keys():
     assert len({task_key(run_fold, value) for value in DIFFERENT}) == len(DIFFERENT)
 
 
-def test_equal_values_have_equal_keys_whatever_objects_they_share(task):
-    one, other = (tuple(map(float, "12")) for _ in range(2))
-    assert task_key(run_fold, (one, one)) == task_key(run_fold, (one, other))
+def test_equal_values_have_equal_keys_even_with_shared_objects(task):
+    first, second = (tuple(map(float, "12")) for _ in range(2))
+    assert task_key(run_fold, (first, first)) == task_key(run_fold, (first, second))
     assert task_key(run_fold, decode(encode(task))) == task_key(run_fold, task)
     every_second = np.arange(6.0)[::2]
     assert task_key(run_fold, every_second) == task_key(run_fold, every_second.copy())
@@ -212,7 +212,7 @@ def test_a_flipped_digit_is_detected(tmp_path, task, result):
 
 
 def filled(folder, results, size=1000):
-    """Return the paths of so many files, each used a second after the one before."""
+    """Return the paths of `results` files, each used a second after the one before."""
     paths = [folder / f"{number:064x}.json" for number in range(results)]
     for second, path in enumerate(paths):
         path.write_bytes(bytes(size))
@@ -243,11 +243,11 @@ def test_a_store_never_grows_beyond_its_size(tmp_path, task, result):
     ResultStore(tmp_path).put(run_fold, tasks[0], result)
     size = sum(path.stat().st_size for path in tmp_path.iterdir())
     store = ResultStore(tmp_path, most=int(3.5 * size))
-    for number, one in enumerate(tasks):
-        store.put(run_fold, one, result)
+    for number, job in enumerate(tasks):
+        store.put(run_fold, job, result)
         assert sum(p.stat().st_size for p in tmp_path.iterdir()) <= 3.5 * size
-        os.utime(next(tmp_path.glob(f"{task_key(run_fold, one)}*")), (number, number))
-    assert [store.get(run_fold, one) is not None for one in tasks] == [False] * 3 + [
+        os.utime(next(tmp_path.glob(f"{task_key(run_fold, job)}*")), (number, number))
+    assert [store.get(run_fold, job) is not None for job in tasks] == [False] * 3 + [
         True
     ] * 3
 
@@ -302,8 +302,8 @@ def test_a_name_without_a_result_is_not_an_error(tmp_path, task, result, what):
 
 @pytest.mark.parametrize("model", list(MODELS))
 def test_every_registered_model_round_trips_through_disk(tmp_path, task, model):
-    one = replace(task, options=replace(task.options, models=(model,)))
-    store, fold = ResultStore(tmp_path), run_fold(one)
-    store.put(run_fold, one, fold)
-    assert encode(store.get(run_fold, one)) == encode(fold)
+    single = replace(task, options=replace(task.options, models=(model,)))
+    store, fold = ResultStore(tmp_path), run_fold(single)
+    store.put(run_fold, single, fold)
+    assert encode(store.get(run_fold, single)) == encode(fold)
     assert set(fold.models) == {model}

@@ -98,9 +98,9 @@ def test_csv_keeps_a_terrain_from_becoming_a_formula(make_series, moving):
 def test_results_are_identical_bit_by_bit_for_two_workers(small_study, slice_trials):
     options = StudyOptions(fit=SMALL_FIT, n_jobs=2)
     parallel = run_study(slice_trials, options, simulated=True)
-    one, two = to_fits(small_study), to_fits(parallel)
-    one["options"]["n_jobs"] = two["options"]["n_jobs"] = None
-    assert one == two
+    serial, concurrent = to_fits(small_study), to_fits(parallel)
+    serial["options"]["n_jobs"] = concurrent["options"]["n_jobs"] = None
+    assert serial == concurrent
 
 
 def test_break_away_is_fitted_and_stored_on_request(slice_trials):

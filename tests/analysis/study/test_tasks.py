@@ -113,13 +113,13 @@ def test_results_from_before_an_interruption_are_kept():
     assert store.results == {(square, 3): 9}
 
 
-def itself(values):
+def identity(values):
     return values
 
 
 def test_arrays_round_trip_through_workers_bit_for_bit():
     values = np.random.default_rng(0).normal(size=300_000)
-    for found in run_tasks(itself, [values, values], 2):
+    for found in run_tasks(identity, [values, values], 2):
         assert type(found) is np.ndarray
         assert found.tobytes() == values.tobytes()
 

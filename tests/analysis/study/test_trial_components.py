@@ -1,4 +1,4 @@
-"""How trials differ and rows repeat, recovered from drawn trials."""
+"""Variance components of trials are recovered from drawn trials."""
 
 from dataclasses import replace
 
@@ -99,5 +99,5 @@ def test_residuals_are_of_held_out_rows():
         )
         found = fit_components(replace(task, trials=short))
         seen.append(found.within**2 + found.measurement**2)
-    # 60 rows: fitted to all of them the function takes a part of their noise, 0.490
+    # 60 rows: a function fitted to all of them absorbs a part of their noise, 0.490
     assert np.sqrt(np.mean(seen)) == pytest.approx(0.5, rel=0.015)

@@ -1,4 +1,4 @@
-"""What outlives nobody and runs no script twice: processes for tasks.
+"""Worker processes end with their parent and do not run its script again.
 
 A script's output ends when the last of its processes has closed it.
 """

@@ -1,6 +1,6 @@
 """Options that describe the files of sixteen dialects."""
 
-# What has to be stated of a file: it is neither RFC 4180 nor in N, m/s and s.
+# Options of files that are not RFC 4180 or not in N, m/s and s.
 STATED = {
     "semicolon_comma": {"separator": ";", "decimal": ","},
     "utf16_tab": {"separator": "\t"},

@@ -1,4 +1,4 @@
-"""Files of sixteen dialects are read as their description says, once it is stated."""
+"""Files of sixteen dialects are read according to their stated description."""
 
 import json
 

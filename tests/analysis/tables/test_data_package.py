@@ -25,7 +25,7 @@ ROWS = "t [s],v_t [mm/s],F_n [N],F_t [N]\n" + "".join(
 
 
 def write_package(folder: Path, path="S1/T01.csv", text=ROWS, **changes) -> Path:
-    """Write a package of one table, with changes to what it says of the file."""
+    """Write a package of one table, with changes to its entry of the file."""
     file = folder / "S1" / "T01.csv"
     file.parent.mkdir(exist_ok=True)
     file.write_text(text)
@@ -135,9 +135,6 @@ def test_a_folder_without_a_package_is_refused(tmp_path):
 def test_a_terrain_given_for_csv_files_does_not_rename_a_package(tmp_path):
     write_package(tmp_path)
     assert list(load_tables([tmp_path], terrain="mine")) == ["gravel"]
-
-
-# --- Parquet --------------------------------------------------------------------------
 
 
 def columns(count=6, **more):

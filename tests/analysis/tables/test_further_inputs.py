@@ -21,7 +21,7 @@ COLUMNS = parse_columns("v_t=v,F_n=N,F_t=T,trial=repeat,terrain=wheel")
 AS_THEY_ARE = PrepareOptions(smoothing=1, downsample=1, slowest=1e-4, fastest=1.0)
 
 
-def a_table(path, rows=40, wheels=("a", "b"), repeats=(1, 2, 3)):
+def write_table(path, rows=40, wheels=("a", "b"), repeats=(1, 2, 3)):
     """Write a table whose F_t is 2 N for every unit of its angle, in mixed order."""
     rng = np.random.default_rng(3)
     lines = ["wheel,repeat,v,N,T,angle"]
@@ -41,7 +41,7 @@ def load(path, **options):
 
 
 def test_rows_that_name_their_trial_become_trials_of_their_terrain(tmp_path):
-    trials = load(a_table(tmp_path / "runs.csv"))
+    trials = load(write_table(tmp_path / "runs.csv"))
     assert {name: len(series) for name, series in trials.items()} == {"a": 3, "b": 3}
     first = trials["a"][0]
     assert first.name == "runs.csv:a/1"
@@ -50,7 +50,7 @@ def test_rows_that_name_their_trial_become_trials_of_their_terrain(tmp_path):
 
 
 def test_a_row_without_its_input_is_dropped_and_named(tmp_path):
-    path = a_table(tmp_path / "runs.csv")
+    path = write_table(tmp_path / "runs.csv")
     lines = path.read_text().splitlines()
     lines[7] = lines[7].rpartition(",")[0] + ","
     path.write_text("\n".join(lines))
@@ -85,7 +85,7 @@ def test_inputs_are_smoothed_as_the_forces_are():
 
 
 def test_processes_accept_further_inputs_and_tustin_does_not(tmp_path):
-    path = a_table(tmp_path / "runs.csv", wheels=("a",))
+    path = write_table(tmp_path / "runs.csv", wheels=("a",))
     options = StudyOptions(
         AS_THEY_ARE, fit=FitOptions(models=(TUSTIN, GP_SE), draws=0), n_jobs=1
     )
@@ -104,7 +104,7 @@ def test_processes_accept_further_inputs_and_tustin_does_not(tmp_path):
 
 
 def test_trials_with_different_inputs_are_not_combined(tmp_path):
-    path = a_table(tmp_path / "runs.csv", wheels=("a",))
+    path = write_table(tmp_path / "runs.csv", wheels=("a",))
     trials = load(path) | {"b": load_tables([path], COLUMNS, rate=1.0)["a"]}
     with pytest.raises(SettingsError, match=r"differ in their inputs: angle; none"):
         run_study(trials, StudyOptions(AS_THEY_ARE), simulated=False)
@@ -130,7 +130,7 @@ def test_an_invalid_list_of_inputs_is_refused(text, reason):
 
 
 def test_a_missing_input_is_reported_with_the_available_columns(tmp_path):
-    path = a_table(tmp_path / "runs.csv")
+    path = write_table(tmp_path / "runs.csv")
     with pytest.raises(SettingsError, match="no column skid") as refused:
         load_tables([path], COLUMNS, rate=1.0, inputs=("skid",))
     assert refused.value.hint == (
@@ -139,7 +139,7 @@ def test_a_missing_input_is_reported_with_the_available_columns(tmp_path):
 
 
 def test_an_input_with_a_duplicated_name_is_taken_by_position(tmp_path):
-    path = a_table(tmp_path / "runs.csv")
+    path = write_table(tmp_path / "runs.csv")
     header, _, rows = path.read_text().partition("\n")
     wide = "\n".join(f"{row},7" for row in rows.split())
     path.write_text(f"{header},angle\n{wide}\n")
@@ -153,7 +153,7 @@ def test_an_input_with_a_duplicated_name_is_taken_by_position(tmp_path):
 
 
 def test_a_non_numeric_input_is_refused(tmp_path):
-    path = a_table(tmp_path / "runs.csv")
+    path = write_table(tmp_path / "runs.csv")
     lines = path.read_text().splitlines()
     lines[7] = lines[7].rpartition(",")[0] + ",1e300"
     path.write_text("\n".join(lines))
@@ -164,7 +164,7 @@ def test_a_non_numeric_input_is_refused(tmp_path):
 @pytest.mark.parametrize("other", ["angle [rad]", "angle"])
 def test_a_further_column_of_two_units_is_refused(tmp_path, other):
     for name, header in (("a.csv", "angle [deg]"), ("b.csv", other)):
-        path = a_table(tmp_path / name)
+        path = write_table(tmp_path / name)
         path.write_text(path.read_text().replace("angle", header, 1))
     paths = [tmp_path / "a.csv", tmp_path / "b.csv"]
     with pytest.raises(SettingsError, match=r"Column angle is in deg in a\.csv"):
@@ -173,7 +173,7 @@ def test_a_further_column_of_two_units_is_refused(tmp_path, other):
 
 def test_a_terrain_is_given_once(tmp_path):
     with pytest.raises(SettingsError, match="a column of it is named too"):
-        load(a_table(tmp_path / "runs.csv"), terrain="c")
+        load(write_table(tmp_path / "runs.csv"), terrain="c")
 
 
 def test_a_column_is_named_once():
@@ -182,7 +182,7 @@ def test_a_column_is_named_once():
 
 
 def test_a_row_without_a_trial_is_refused_with_its_line(tmp_path):
-    path = a_table(tmp_path / "runs.csv")
+    path = write_table(tmp_path / "runs.csv")
     lines = path.read_text().splitlines()
     lines[3] = lines[3].replace("a,3", "a,", 1)
     path.write_text("\n".join(lines))

@@ -1,4 +1,4 @@
-"""Agreement with an independent analysis, and honesty on real measurements."""
+"""Results agree with an independent analysis and are honest on real measurements."""
 
 import json
 

@@ -66,7 +66,7 @@ def test_a_unit_in_the_header_is_converted(tmp_path, header):
     assert load_tables([write(tmp_path, text)])["table"][0].v_t[0] == 0.1
 
 
-def test_the_programs_own_headers_are_read(tmp_path):
+def test_headers_with_units_are_read(tmp_path):
     text = GOOD.replace("t,v_t,F_n,F_t", "t [s],v_t [m/s],F_n [N],F_t [N]")
     assert load_tables([write(tmp_path, text)])["table"][0].F_n[0] == 2.0
 
@@ -183,7 +183,7 @@ def test_a_zip_that_is_not_an_npz_is_refused_with_its_contents(tmp_path):
         load_tables([path])
 
 
-def test_objects_are_never_unpickled(tmp_path):
+def test_an_array_of_objects_is_refused(tmp_path):
     path = tmp_path / "a.npz"
     np.savez(path, **{"S0/00": np.array([[object()] * 4], dtype=object)})
     with pytest.raises(SettingsError, match="not a readable npz"):
@@ -263,7 +263,7 @@ def test_stones_without_a_size_are_refused(text):
 @given(
     noise=st.binary(max_size=300), start=st.sampled_from([b"", b"PK\x03\x04", b"t,"])
 )
-def test_any_bytes_are_read_or_refused(tmp_path, noise, start):
+def test_random_bytes_are_refused(tmp_path, noise, start):
     path = write(tmp_path, start + noise, "noise")
     with pytest.raises(SettingsError):
         load_tables([path])
@@ -291,7 +291,7 @@ def test_rows_without_a_time_are_spread_by_the_rate(tmp_path):
     np.testing.assert_allclose(series.v_t, [0.1, 0.2, 0.3])
 
 
-def test_rows_without_a_time_and_a_rate_say_how_to_give_it(tmp_path):
+def test_rows_without_a_time_are_refused_with_the_option_rate(tmp_path):
     path = write(tmp_path, "v_t,F_n,F_t\n0.1,2,1\n0.2,2,1\n0.3,2,1\n")
     with pytest.raises(SettingsError) as refused:
         load_tables([path])

@@ -1,4 +1,4 @@
-"""Forces from rest in a terrain database: written, read back, refused."""
+"""Forces from rest are written to a terrain database, read back or refused."""
 
 import json
 from dataclasses import replace
@@ -75,7 +75,7 @@ def test_terrain_without_pushes_answers_only_in_motion(path, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "words"),
     [
         ({"law": [1.0, 1.0, -1.0, 0.0]}, "law.2: Input should be greater"),
         ({"kind": "magic"}, "kind: Input should be 'break-away'"),
@@ -83,7 +83,7 @@ def test_terrain_without_pushes_answers_only_in_motion(path, tmp_path):
         ({"draws": 3}, "not a terrain database: .*draws: "),
     ],
 )
-def test_a_damaged_break_away_model_is_refused(path, tmp_path, change, said):
+def test_a_damaged_break_away_model_is_refused(path, tmp_path, change, words):
     bad = changed(path, tmp_path, lambda terrain: terrain["break_away"].update(change))
-    with pytest.raises(SettingsError, match=said):
+    with pytest.raises(SettingsError, match=words):
         load(bad)

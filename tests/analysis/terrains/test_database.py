@@ -1,4 +1,4 @@
-"""The file of a terrain database: its version, its schema, and what it keeps."""
+"""The file of a terrain database keeps its version, its schema and its content."""
 
 import json
 from dataclasses import replace
@@ -52,9 +52,6 @@ def skewed(**more):
     return TerrainDatabase({"S0": terrain}, True, UTC)
 
 
-# --- what is kept ---------------------------------------------------------------------
-
-
 def test_a_written_database_is_read_back(tmp_path):
     database = skewed()
     again = load(saved(tmp_path, to_text(database)))
@@ -74,7 +71,7 @@ def test_a_copula_is_kept_and_bounded(tmp_path):
     content["terrains"]["S0"]["copula"]["tau_stick"] = 0.0
     with pytest.raises(SettingsError, match="tau_stick"):
         load(saved(tmp_path, content))
-    del content["terrains"]["S0"]["copula"]  # as files have been
+    del content["terrains"]["S0"]["copula"]  # as in older files
     assert load(saved(tmp_path, content)).terrain("S0").copula is None
 
 
@@ -117,7 +114,7 @@ def test_risk_and_quantile_are_inverse():
 
 
 def test_the_file_is_read_without_this_project(tmp_path):
-    """Only json and arithmetic: the force at a point of the table, not reached 5 %."""
+    """With json and arithmetic only: the 5 % quantile at a point of the table."""
     content = json.loads(to_text(skewed()))
     model = content["terrains"]["S0"]["models"][content["default"]]
     table = model["quantiles"][content["shares"].index(0.05)]
@@ -170,8 +167,6 @@ def test_a_file_too_large_to_read_is_not_written():
     with pytest.raises(SettingsError, match="6 MB"):
         to_text(skewed(factors={"remarks": "x" * 6_000_000}))
 
-
-# --- the schema -----------------------------------------------------------------------
 
 CHECKED = {
     "$schema", "title", "description", "type", "required", "properties", "const",
@@ -257,7 +252,7 @@ def test_written_files_follow_the_shipped_schema():
 def test_the_schema_refuses_what_the_reader_refuses(tmp_path, changes, location):
     content = changed(**changes)
     assert any(problem.startswith(location) for problem in broken(content))
-    if "simulated" not in changes:  # the reader takes any truth value
+    if "simulated" not in changes:  # the reader accepts any truth value
         with pytest.raises(SettingsError):
             load(saved(tmp_path, content))
 

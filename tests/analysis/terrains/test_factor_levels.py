@@ -1,4 +1,4 @@
-"""Windows are told apart by the words that an experiment states, too."""
+"""Factors that every terrain states and that vary become levels to classify."""
 
 from types import SimpleNamespace
 
@@ -8,7 +8,7 @@ from analysis.terrains.identify import words_of
 
 
 def study_of(**factors):
-    """Return what is asked of a study: the factors of its terrains."""
+    """Return a study with nothing but the factors of its terrains."""
     terrains = {n: SimpleNamespace(factors=f) for n, f in factors.items()}
     return SimpleNamespace(terrains=terrains)
 

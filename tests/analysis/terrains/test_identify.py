@@ -66,11 +66,8 @@ def path(study, found, tmp_path_factory):
     return path
 
 
-# --- log densities --------------------------------------------------------------------
-
-
 def first_order(rho, sd=2.0, count=4000):
-    """Return a trial whose force is a first-order process around nothing."""
+    """Return a trial whose force is a first-order process around zero."""
     rng = np.random.default_rng(3)
     z = np.zeros(count)
     for i, noise in enumerate(rng.normal(size=count - 1), 1):
@@ -81,21 +78,21 @@ def first_order(rho, sd=2.0, count=4000):
     return prepare_trial(series, PrepareOptions(smoothing=1, downsample=1))
 
 
-def around_nothing(trial, sd=2.0):
+def around_zero(trial, sd=2.0):
     return Prediction(np.zeros(trial.kept), np.full(trial.kept, sd))
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.6, 0.95])
 def test_the_correlation_of_neighbours_is_recovered(rho):
     trial = first_order(rho)
-    found = neighbour_correlation([(trial, around_nothing(trial))])
+    found = neighbour_correlation([(trial, around_zero(trial))])
     assert found == pytest.approx(rho, abs=0.04)
 
 
 def test_a_correlated_trial_is_likeliest_under_its_own_correlation():
     trial = first_order(0.9)
     total = {
-        rho: log_densities(trial, around_nothing(trial), rho).sum()
+        rho: log_densities(trial, around_zero(trial), rho).sum()
         for rho in (0.0, 0.7, 0.9, 0.97)
     }
     assert max(total, key=total.get) == 0.9
@@ -107,20 +104,17 @@ def test_densities_are_those_of_the_process():
     expected = -0.5 * z[0] ** 2 - 0.5 * math.log(2 * math.pi) - math.log(2.0)
     step = (z[1] - 0.5 * z[0]) ** 2 / 0.75
     second = -0.5 * step - 0.5 * math.log(2 * math.pi * 0.75) - math.log(2.0)
-    found = log_densities(trial, around_nothing(trial), 0.5)
+    found = log_densities(trial, around_zero(trial), 0.5)
     assert found[:2] == pytest.approx([expected, second])
 
 
 def test_a_single_spike_does_not_decide():
     trial = first_order(0.0, count=200)
-    calm = log_densities(trial, around_nothing(trial), 0.0)
+    calm = log_densities(trial, around_zero(trial), 0.0)
     F_t = trial.F_t.copy()
     F_t[100] = 1e6
-    wild = log_densities(replace(trial, F_t=F_t), around_nothing(trial), 0.0)
+    wild = log_densities(replace(trial, F_t=F_t), around_zero(trial), 0.0)
     assert calm.sum() - wild.sum() < 60.0
-
-
-# --- a study --------------------------------------------------------------------------
 
 
 def test_different_terrains_are_distinguished_by_density(found):
@@ -150,7 +144,7 @@ def test_probabilities_of_one_kind_add_up_over_its_models():
     assert sure.likeliest_group(rows, surfaces) == "flat"
 
 
-def test_neighbouring_residuals_are_alike(found):
+def test_neighbouring_residuals_are_correlated(found):
     assert all(0.3 < rho < 1.0 for rho in found.rho.values())
 
 
@@ -161,7 +155,7 @@ def test_a_study_of_one_terrain_identifies_nothing():
     assert identify_study(one) is None
 
 
-def test_accuracy_counts_every_kind_alike():
+def test_accuracy_weights_every_kind_equally():
     confusion = Confusion(("rocky", "flat"), np.array([[12, 0], [1, 6]]))
     assert confusion.accuracy == pytest.approx((1.0 + 6 / 7) / 2)
 
@@ -197,7 +191,7 @@ def test_recorded_stones_decide_the_kind_of_a_terrain():
     assert levels["terrain"].names == ("Sand", "Beach", "Gravel")
     assert set(levels["stones"].names) == {"flat", "small"}
     assert set(levels["surface"].names) == {"flat", "rocky"}
-    # twins cannot be told apart, but both count as small stones
+    # equal terrains cannot be distinguished, but both count as small stones
     assert levels["terrain"].accuracy < 0.9
     assert levels["stones"].accuracy > 0.9
     content = json.loads(database_of(study, None, "2027-01-15T08:00:00Z", 1))
@@ -218,10 +212,7 @@ def test_unknown_ground_is_rejected_and_known_ground_rarely(shared_data):
         assert exclusion.rocky_among_flat > 0.7, size
 
 
-# --- the database ---------------------------------------------------------------------
-
-
-def test_the_database_answers_as_the_models_do(study, path):
+def test_the_database_predicts_the_force_of_its_terrain(study, path):
     known = load(path).terrain("S0")
     answer = known.predict(3.5, 0.05)
     assert answer.mean == pytest.approx(1.5 * 3.5, abs=0.6)
@@ -281,7 +272,7 @@ def test_an_unknown_terrain_and_an_unknown_model_are_named(path):
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "words"),
     [
         ({"version": 3}, "version: it is 3, and only 1.0 is read"),
         ({"terrains": {}}, "terrains: Dictionary should have at least 1 item"),
@@ -298,11 +289,11 @@ def test_an_unknown_terrain_and_an_unknown_model_are_named(path):
         ({"terrains": 3}, "not a terrain database: terrains: "),
     ],
 )
-def test_a_file_that_is_not_a_database_is_refused(path, tmp_path, change, said):
+def test_a_file_that_is_not_a_database_is_refused(path, tmp_path, change, words):
     content = json.loads(path.read_text()) | change
     bad = tmp_path / "bad.json"
     bad.write_text(json.dumps(content))
-    with pytest.raises(SettingsError, match=said):
+    with pytest.raises(SettingsError, match=words):
         load(bad)
 
 
@@ -326,9 +317,6 @@ def test_a_distant_point_still_has_an_answer(F_n, v_t):
     low, high = table.at(F_n, v_t)
     assert 1.0 <= low <= 4.0
     assert low == high
-
-
-# --- recognition ----------------------------------------------------------------------
 
 
 def kept(series):
@@ -375,7 +363,7 @@ def test_without_a_classifier_surfaces_are_classified_by_the_models(path, tmp_pa
     assert {moment.rocky for moment in seen.moments} == {None}
 
 
-def test_a_plate_is_not_classified_as_stones(path, tmp_path):
+def test_ground_smoother_than_all_known_stones_is_unknown(path, tmp_path):
     content = json.loads(path.read_text())
     content["terrains"] = {"S0": content["terrains"]["S0"]}
     stones = tmp_path / "stones.json"
@@ -404,7 +392,7 @@ def test_a_damaged_part_of_a_database_is_refused(path, tmp_path, change):
         load(bad)
 
 
-def test_stones_of_one_kind_are_a_family(study, found):
+def test_a_single_terrain_with_stones_has_no_accuracy_of_stones(study, found):
     assert found.exact_stones(100) is None  # of a single terrain
     assert found.rocky == ("S0",)
 

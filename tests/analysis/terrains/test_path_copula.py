@@ -1,4 +1,4 @@
-"""Forces drawn along a path: their correlations, their distribution, their sign."""
+"""Forces sampled along a path have known correlations, quantiles and signs."""
 
 from dataclasses import replace
 
@@ -21,7 +21,7 @@ TRUE = PathCopula(level=0.3, tau_stick=0.05, tau_slide=0.25)
 
 
 def stick_slip(rows):
-    """Return at which steps the foot sticks: four of ten."""
+    """Return a mask of the steps in which the foot sticks: four of ten."""
     return np.arange(rows) % 10 < 4
 
 
@@ -100,7 +100,7 @@ def test_a_path_outside_the_table_is_clamped_to_its_edge():
     assert np.array_equal(known.sample([9.0 * F_n] * 40, 9.0 * v_t, DT, seed=6), edge)
 
 
-def test_sampled_forces_have_a_sign_of_their_quantiles():
+def test_sampled_forces_keep_the_sign_of_their_quantiles():
     scores = np.array([[-9.0], [9.0]])
     forces = np.exp(normal_scores(SHARES))[
         :, None

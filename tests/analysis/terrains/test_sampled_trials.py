@@ -1,4 +1,4 @@
-"""Trials drawn along recorded paths, beside those recorded and left out."""
+"""Trials sampled along recorded paths resemble held-out recordings."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Features of windows, the classifier of surfaces, and what is excluded."""
+"""Windows of trials are described, classified by surface, or rejected as unknown."""
 
 import json
 import math
@@ -98,11 +98,8 @@ def test_a_constant_window_has_finite_features():
     assert np.isfinite(features).all()
 
 
-# --- the classifier -------------------------------------------------------------------
-
-
 def drawn(seed=0, count=4000, shift=0.7):
-    """Return normal features of two kinds whose means lie 2 `shift` apart in two."""
+    """Return normal features of two kinds; the means of two are 2 `shift` apart."""
     rng = np.random.default_rng(seed)
     is_rocky = rng.uniform(size=count) < 0.5
     X = rng.normal(size=(count, len(FEATURES)))
@@ -208,19 +205,16 @@ def test_a_damaged_classifier_is_refused(classifier, change):
         SurfaceClassifier.from_dict(content)
 
 
-# --- calibration and exclusion --------------------------------------------------------
-
-
-def said(rocky, surface, count):
+def outcomes(rocky, surface, count):
     return [SurfaceProbability("S0", surface, rocky)] * count
 
 
 def test_calibrated_probabilities_have_no_calibration_error():
     honest = [
-        *said(0.8, ROCKY_GROUND, 80),
-        *said(0.8, FLAT_GROUND, 20),
-        *said(0.2, ROCKY_GROUND, 20),
-        *said(0.2, FLAT_GROUND, 80),
+        *outcomes(0.8, ROCKY_GROUND, 80),
+        *outcomes(0.8, FLAT_GROUND, 20),
+        *outcomes(0.2, ROCKY_GROUND, 20),
+        *outcomes(0.2, FLAT_GROUND, 80),
     ]
     assert calibration_of(honest).error == pytest.approx(0.0, abs=1e-9)
     bold = [replace(p, rocky=0.99 if p.rocky > 0.5 else 0.01) for p in honest]
@@ -310,7 +304,7 @@ def made_up(name, number, rng):
 
 @pytest.mark.parametrize("surface", [ROCKY_GROUND, FLAT_GROUND])
 @pytest.mark.parametrize("trials", [10, 40])
-def test_the_rejection_rate_of_held_out_windows_is_as_allowed(surface, trials):
+def test_the_rejection_rate_of_held_out_windows_is_the_allowed_one(surface, trials):
     shares = []
     for seed in range(8):
         rng = np.random.default_rng(seed)

@@ -52,7 +52,7 @@ def test_the_model_is_odd_in_velocity():
     np.testing.assert_allclose(predict(PLAIN, F_n, -v), -predict(PLAIN, F_n, v))
 
 
-def test_standstill_gives_the_static_force():
+def test_the_force_at_rest_is_the_static_friction():
     assert predict(PLAIN, np.array([2.0]), np.array([0.0]))[0] == 9.0
 
 
@@ -76,7 +76,7 @@ def test_sticking_holds_the_larger_of_static_and_sliding_force():
     np.testing.assert_allclose(printed, [3.0, 12.0])
 
 
-def test_linear_parameters_and_error_at_a_given_shape(vectors, samples):
+def test_linear_parameters_and_error_have_the_reference_values(vectors, samples):
     case = vectors["tustin"]["profile_at"]
     problem = Problem(samples, TustinBounds().box())
     point = problem.project(np.log([case["v_s"], case["delta"]])).point
@@ -268,7 +268,7 @@ def test_a_start_near_a_known_optimum_is_abandoned(stones):
 def test_the_bootstrap_resamples_trials_and_contains_the_truth():
     rng = np.random.default_rng(14)
     trials = []
-    for shift in rng.normal(0, 0.3, 10):  # what a trial has in common
+    for shift in rng.normal(0, 0.3, 10):  # common to the rows of a trial
         F_n, v = rng.uniform(2, 10, 200), np.exp(rng.uniform(-5.3, -1.6, 200))
         F_t = predict(PLAIN, F_n, v) + shift + rng.normal(0, 0.1, 200)
         trials.append((F_n, v, F_t))
@@ -301,7 +301,7 @@ def test_parameters_stay_inside_narrow_bounds(samples):
     assert "b at upper bound" in found.flags
 
 
-def test_constant_load_is_fitted_all_the_same():
+def test_a_constant_load_is_fitted():
     rng = np.random.default_rng(3)
     v = rng.uniform(0.005, 0.2, 200)
     F_t = predict(PLAIN, np.full(200, 5.0), v)
@@ -337,7 +337,7 @@ def test_the_box_solution_is_never_worse_than_scipys(A, y):
     assert ours <= other + 1e-6 * (1.0 + other)
 
 
-def test_correlation_time_of_a_known_process():
+def test_the_correlation_time_of_a_known_process_is_found():
     rng = np.random.default_rng(0)
     x = np.zeros(200_000)
     kicks = rng.normal(size=x.size)

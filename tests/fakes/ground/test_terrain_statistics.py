@@ -95,9 +95,6 @@ def column(run, name):
     return np.concatenate([getattr(trial, name) for trial in run.trials])
 
 
-# --- the short form: a few trials, wide bounds ----------------------------------------
-
-
 @pytest.fixture(scope="module")
 def few():
     return {name: push_across(name, 1, range(1, 4)) for name in ("S0", "B15", "TF")}
@@ -149,9 +146,6 @@ def test_a_point_foot_repeats_itself_bit_for_bit():
     first = start(2)
     start(3)
     assert start(2) == first
-
-
-# --- the long form: what the reference ran --------------------------------------------
 
 
 @pytest.fixture(scope="module")

@@ -234,9 +234,6 @@ def test_ground_parameters_are_listed_as_text(rig_and_clock):
     assert all(isinstance(value, str) for value in parameters.values())
 
 
-# --- randomness -----------------------------------------------------------------------
-
-
 def test_a_buffered_stream_equals_its_generator():
     normals = NormalStream(np.random.default_rng(1), block=3)
     drawn = np.random.default_rng(1).standard_normal(9).tolist()

@@ -27,9 +27,6 @@ TORQUE = bytes.fromhex("9a 01 00 fc 3d 00")  # (0.1, -0.25, 0.015) N m
 ZERO = np.zeros(7)
 
 
-# --- pairing --------------------------------------------------------------------------
-
-
 @pytest.fixture
 def pairing():
     pairing = WrenchPairing(BarrettCounters())
@@ -156,9 +153,6 @@ def test_a_status_is_described():
         "gauge 1 saturated since the tare",
         "gauge 6 saturated since the tare",
     )
-
-
-# --- the sensor on a bus --------------------------------------------------------------
 
 
 class Bench:

@@ -72,6 +72,6 @@ def test_a_damaged_file_is_refused_by_name(example_tool, spoil):
 
 
 @given(st.text(max_size=200))
-def test_any_text_is_read_or_refused(text):
+def test_any_other_text_is_refused(text):
     with pytest.raises(SettingsError):
         gravity_from_toml(text, "g.toml")

@@ -25,12 +25,12 @@ class Driven:
         self.arm = WamArm(self.rig.link, self.rig.clock)
         self.arm.start()
         self.number = 0
-        self.disobedience = None
+        self.deviation = None
         self.run(20)
         if is_active:
             self.rig.network.pendant("activate")
             self.run(50)
-        assert self.disobedience is None
+        assert self.deviation is None
 
     def run(self, cycles):
         """Run until a contradiction is reported; return the number of cycles."""
@@ -42,7 +42,7 @@ class Driven:
                 self.arm.send(share * JOINTS, np.zeros(7))
             self.rig.rest(CYCLE_NS - self.rig.clock.t_ns % CYCLE_NS)
             if reading.disobeys is not None:
-                self.disobedience = reading.disobeys
+                self.deviation = reading.disobeys
                 return cycle
         return cycles
 
@@ -86,7 +86,7 @@ def test_lost_replies_are_not_reported_as_disobedience(driven):
 def test_a_puck_that_leaves_torque_mode_is_reported(driven, node):
     driven.rig.network.lose_mode(node)
     assert driven.run(PERIODS) < PERIODS
-    assert driven.disobedience == MotorChange(node, "MODE", PuckMode.TORQUE, PuckMode.IDLE)
+    assert driven.deviation == MotorChange(node, "MODE", PuckMode.TORQUE, PuckMode.IDLE)
 
 
 @pytest.mark.parametrize("group", GROUPS)
@@ -94,9 +94,9 @@ def test_torques_that_reach_no_puck_are_reported(driven, group):
     lost = group_id(group)
     driven.rig.network.faults.lose_from_host(lambda can_id, _: can_id == lost)
     assert driven.run(PERIODS) < PERIODS
-    assert driven.disobedience.name == "T"
-    assert driven.disobedience.motor in GROUPS[group]
-    assert driven.disobedience.value != driven.disobedience.was
+    assert driven.deviation.name == "T"
+    assert driven.deviation.motor in GROUPS[group]
+    assert driven.deviation.value != driven.deviation.was
 
 
 @pytest.mark.parametrize("node", MOTOR_NODES)
@@ -106,7 +106,7 @@ def test_a_puck_that_missed_idle_is_idled_individually_and_reported(driven, node
     assert driven.arm.idle()
     assert network.driven() == []
     driven.run(1)
-    assert driven.disobedience == MotorChange(node, "MODE", PuckMode.IDLE, PuckMode.TORQUE)
+    assert driven.deviation == MotorChange(node, "MODE", PuckMode.IDLE, PuckMode.TORQUE)
 
 
 @pytest.mark.parametrize("node", MOTOR_NODES)

@@ -1,4 +1,4 @@
-"""What a report states of forces from rest."""
+"""A report states forces from rest with their kind and their pushes."""
 
 import json
 

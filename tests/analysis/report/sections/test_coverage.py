@@ -1,4 +1,4 @@
-"""The caption of the coverage map: which cells of speed and load are thin."""
+"""The caption of the coverage map names the thin cells of speed and load."""
 
 from analysis.data.quality import coverage, thinnest
 from analysis.report.results import compute_results

@@ -1,4 +1,4 @@
-"""The figure of drift: sessions in their order, whatever order they are given in."""
+"""The figure of drift shows sessions in the order of their start."""
 
 from types import SimpleNamespace
 
@@ -8,7 +8,7 @@ from analysis.report.sections.rig_health.section import caption_drift, draw_drif
 
 
 def trial(session, number, tare, load_bias):
-    """Return what is asked of a trial's health."""
+    """Return the fields of a trial's health that the figure uses."""
     return SimpleNamespace(
         name=f"{session}/T{number:02d}",
         session=session,

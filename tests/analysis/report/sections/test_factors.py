@@ -1,4 +1,4 @@
-"""The figure of traction by factors: which of them, and where their values stand."""
+"""The figure of traction by factors shows those that vary, in order of their values."""
 
 from types import SimpleNamespace
 
@@ -12,7 +12,7 @@ from analysis.report.sections.beyond_paper.factors import (
 
 
 def trial(ratio):
-    """Return what is asked of a trial: forces of a ratio."""
+    """Return a trial with nothing but forces of a ratio."""
     import numpy as np
 
     return SimpleNamespace(kept=1, F_n=np.full(3, 2.0), F_t=np.full(3, 2.0 * ratio))

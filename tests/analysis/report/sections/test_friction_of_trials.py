@@ -1,4 +1,4 @@
-"""What a recorded calibration of friction says of a trial."""
+"""The drag of a trial follows the calibration of friction recorded with it."""
 
 from dataclasses import replace
 

@@ -26,7 +26,7 @@ pytestmark = pytest.mark.slow  # a whole study
 
 
 def reach_of(others, nominal):
-    """Return the reach of one trial more, however large its own scores are."""
+    """Return the reach for one more trial, however large its own scores are."""
     return conformal_reaches([np.full(3, 1e6), *others], nominal)[0]
 
 

@@ -60,10 +60,11 @@ def test_a_faulty_trial_ranks_first_with_its_cause(change, words):
     trials = [push(k) for k in range(10)]
     trials[3] = change(trials[3])
     study = studied(trials)
-    odd = outlier_trials(study)
-    assert (odd[0].terrain, odd[0].number, odd[0].name) == ("X", 4, "T04")
-    assert odd[0].score > 1.0
-    assert any(words in reason for reason in odd[0].reasons), odd[0].reasons
+    outliers = outlier_trials(study)
+    first = outliers[0]
+    assert (first.terrain, first.number, first.name) == ("X", 4, "T04")
+    assert first.score > 1.0
+    assert any(words in reason for reason in first.reasons), first.reasons
     (table,) = outlier_tables(study)
     assert table.rows[0][1] == "4"
 
@@ -72,7 +73,7 @@ def test_several_trials_with_one_fault_do_not_mask_each_other():
     trials = [push(k) for k in range(10)]
     for k in (2, 5, 8):
         trials[k] = replace(trials[k], F_t=trials[k].F_t + 3.0)
-    assert {odd.number for odd in outlier_trials(studied(trials))} == {3, 6, 9}
+    assert {trial.number for trial in outlier_trials(studied(trials))} == {3, 6, 9}
 
 
 def test_the_scale_is_the_standard_deviation_of_normal_values():
@@ -88,8 +89,8 @@ def test_the_scale_is_robust_to_half_of_the_values():
     assert qn_scale(x) < 5.0
 
 
-def stood(series):
-    """Return a push before which the foot stands on its weight alone, at 125 Hz.
+def after_a_rest(series):
+    """Return a push at 125 Hz after a rest of the foot under its weight alone.
 
     Such a rate is too low for the lag of a force.
     """
@@ -122,7 +123,7 @@ def stood(series):
     ],
 )
 def test_a_wrong_sensor_is_detected_at_rest_on_any_ground(change, words):
-    trials = [stood(push(k, mu=0.4 + 0.1 * k)) for k in range(10)]
+    trials = [after_a_rest(push(k, mu=0.4 + 0.1 * k)) for k in range(10)]
     assert outlier_trials(studied(trials)) == []
     trials[3] = change(trials[3])
     assert outlier_trials(studied(trials))[0].number == 4

@@ -1,4 +1,4 @@
-"""The statements of the paper, each held against a study."""
+"""The statements of the paper are compared with a study."""
 
 import json
 from dataclasses import replace

@@ -48,7 +48,7 @@ def test_unknown_choices_are_refused_with_a_list(text):
     assert all(word in refused.value.hint for word in expected)
 
 
-def test_choices_change_what_they_name_and_nothing_else():
+def test_a_choice_changes_only_its_own_option():
     before = StudyOptions()
     smoothed = parse_choice("smoothing=25").options(before)
     assert smoothed.prepare.smoothing == 25
@@ -81,10 +81,10 @@ def test_other_training_samples_are_scored_on_the_same_test_samples(
     varied, _ = plan_folds(
         prepared(after.prepare), after.fit, prepared(after.target or after.prepare)
     )
-    for one, other in zip(plain, varied, strict=True):
-        np.testing.assert_array_equal(one.test_trials[0].F_t, other.test_trials[0].F_t)
-        assert one.training.F_t.shape != other.training.F_t.shape or not np.allclose(
-            one.training.F_t, other.training.F_t
+    for fold, other in zip(plain, varied, strict=True):
+        np.testing.assert_array_equal(fold.test_trials[0].F_t, other.test_trials[0].F_t)
+        assert fold.training.F_t.shape != other.training.F_t.shape or not np.allclose(
+            fold.training.F_t, other.training.F_t
         )
 
 
@@ -129,7 +129,7 @@ def both(make_series, moving):
 
 
 @pytest.mark.slow
-def test_both_studies_stand_side_by_side(both):
+def test_both_studies_are_shown_side_by_side(both):
     choice, before, after = both
     table = comparison_table(choice, before, after)
     row = next(row for row in table.rows if row[1] == "Tustin")

@@ -1,4 +1,4 @@
-"""C programs around the exported header, compiled with the flags it has to bear."""
+"""C programs around the exported header, compiled with its strictest flags."""
 
 import shutil
 import subprocess
@@ -40,7 +40,7 @@ def compiler(suffix="c"):
 
 
 def build(folder, code, *flags, suffix="c"):
-    """Return a program of `code`, beside the header in `folder`."""
+    """Return a program compiled from `code` with the header in `folder`."""
     source = folder / f"program.{suffix}"
     source.write_text(code)
     program = folder / f"program_{suffix}"
@@ -51,7 +51,7 @@ def build(folder, code, *flags, suffix="c"):
 
 
 def ask(folder, call, count, *columns):
-    """Return what `call` answers for rows of a, b, c: (n, count), and codes."""
+    """Return the values of `call` for rows of a, b, c, shape (n, count), and codes."""
     code = LOOP.replace("CALL", call).replace("COUNT", str(count))
     program = build(folder, code, *FLAGS)
     padded = (*columns, *(np.zeros(columns[0].size),) * (3 - len(columns)))

@@ -1,4 +1,4 @@
-"""Databases of two terrains as a study makes them, without a study; and many points."""
+"""Databases of two terrains like those of a study, and many points."""
 
 from math import log
 
@@ -115,7 +115,7 @@ def database_file(folder, **about):
 
 
 def points(count=100_000, seed=3):
-    """Return F_n [N] and v_t [m/s]: random ones, the grid itself, edges, outsides."""
+    """Return F_n [N] and v_t [m/s]: random ones, the grid, edges, points outside."""
     rng = np.random.default_rng(seed)
     F_n = rng.uniform(F_N[0] - 3.0, F_N[-1] + 5.0, count)
     v_t = np.exp(rng.uniform(np.log(0.001), np.log(0.6), count))

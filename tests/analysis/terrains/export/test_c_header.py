@@ -1,4 +1,4 @@
-"""The C header: what it answers is what Python answers."""
+"""The C header gives the same answers as Python."""
 
 import subprocess
 from dataclasses import replace
@@ -54,7 +54,7 @@ def test_single_precision_forces_are_accurate(tmp_path, name):
     assert np.abs(forces.T - expected).max() <= 1e-5 * np.abs(expected).max()
 
 
-def test_a_share_is_an_index(header):
+def test_a_quantile_is_requested_by_the_index_of_its_share(header):
     F_n, v_t = np.array([3.0, 3.0, 3.0]), np.array([0.05, 0.05, 0.05])
     call = "traction_S0_quantile(a, b, (int)c, out)"
     forces, codes = ask(header, call, 1, F_n, v_t, np.array([4.0, 9.0, -1.0]))
@@ -93,7 +93,7 @@ def test_risk_from_rest_equals_python_and_rises_with_the_force(header, name):
     assert np.abs(risks[:, 0] - model.risks(required, F_n)).max() <= 1e-5
     rows = zip(required, F_n, strict=True)
     expected = [model.slip_risk(*row).is_extrapolated for row in rows]
-    assert codes.tolist() == [int(each) for each in expected]
+    assert codes.tolist() == [int(is_outside) for is_outside in expected]
     order = np.argsort(required)
     risks, _ = ask(header, call, 1, required[order], np.full(4000, 4.0))
     assert (np.diff(risks[:, 0]) >= 0.0).all()
@@ -116,7 +116,7 @@ def test_values_that_are_not_finite_are_refused(header):
     force, code = ask(header, "traction_S0_quantiles(b, c, out)", 9, *rows)
     assert np.array_equal(force[3:], np.zeros((6, 9)))
     assert code[3:].tolist() == [-1] * 6
-    assert code[:3].tolist() == [0] * 3  # the force required is none of its inputs
+    assert code[:3].tolist() == [0] * 3  # the required force is not one of its inputs
     risk, code = ask(header, "traction_S0_risk_sliding(a, b, c, out)", 1, *rows)
     assert (risk.ravel().tolist(), code.tolist()) == ([1.0] * 9, [-1] * 9)
     risk, code = ask(header, "traction_S0_risk_rest(a, b, out)", 1, *rows)

@@ -1,4 +1,4 @@
-"""Every target: README, source, whose trials they are, and names that mean harm."""
+"""Every target has a README, a source and an origin; hostile names do no harm."""
 
 import json
 import re
@@ -35,7 +35,7 @@ TARGET = ExportTarget(
 """
 
 
-def test_the_third_target_is_a_single_file(tmp_path, monkeypatch):
+def test_a_further_target_is_a_single_file(tmp_path, monkeypatch):
     from analysis.terrains.export import targets
 
     (tmp_path / "third.py").write_text(THIRD)

@@ -1,4 +1,4 @@
-"""ONNX graphs: four operators, the same forces, NaN stays NaN."""
+"""ONNX graphs give the same forces with few operators, and NaN stays NaN."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Programs in the documentation: compiled, run, and right."""
+"""Programs in the documentation compile, run and give the stated results."""
 
 import re
 import subprocess
@@ -42,7 +42,7 @@ def test_the_controller_example_has_its_stated_risk(folder):
         assert risks[0] <= 0.05 + 1e-5
         assert risks[1] > 0.05 or force == 6.0
     assert asked[0] < asked[1] <= 6.0
-    assert asked[3] == 0.0  # nothing is asked of a foot that is not known
+    assert asked[3] == 0.0  # no force is requested at an unknown load
 
 
 def test_the_controller_example_is_right_in_single_precision(tmp_path):

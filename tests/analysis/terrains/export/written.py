@@ -5,7 +5,7 @@ from tests.analysis.terrains.export.databases import export
 
 
 def write(folder, target, **options):
-    """Write what a target makes of the two terrains into `folder`, and return it."""
+    """Write the files of a target for the two terrains into `folder`, and return it."""
     for path, content in target_files(target, export(**options)).items():
         file = folder / path
         file.parent.mkdir(parents=True, exist_ok=True)
