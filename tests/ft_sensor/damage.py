@@ -32,7 +32,7 @@ def damaged_stream(make, encode, fault, seed):
 
 
 def parse(scanner, data: bytes, chunk: int) -> list:
-    """Return what `scanner` finds in `data`, fed in pieces."""
+    """Return the frames that `scanner` finds in `data`, fed in pieces."""
     return [
         frame
         for start in range(0, len(data), chunk)

@@ -1,4 +1,4 @@
-"""Each wrist sensor on its simulated device, on a clock that is stepped by hand."""
+"""Each wrist sensor on its simulated device, on a manually stepped clock."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -73,7 +73,7 @@ class ChunkedPort(FakeSerialPort):
 
 @dataclass(frozen=True)
 class Make:
-    """One make: its device, its driver, and what is peculiar to it."""
+    """One make of sensor: its device, its driver and its peculiarities."""
 
     stream: Callable[..., SensorStream]
     options: Callable[..., Any]
@@ -84,7 +84,7 @@ class Make:
     has_clock: bool
     quiet_start: dict[str, Any]
     running_start: dict[str, Any]
-    is_checked: bool = False  # the network drops what is damaged
+    is_checked: bool = False  # the network drops damaged packets
 
 
 MAKES = {
@@ -139,12 +139,12 @@ MAKES = {
 
 
 class SensorBench:
-    """A sensor on a simulated device, both in one hand."""
+    """A sensor and its simulated device."""
 
     def __init__(
         self, kind, load=LOAD, line_xor=0, chunk=4096, network=None, **options
     ) -> None:
-        """`network` makes a stream of the device's: what happens on the way."""
+        """`network` wraps the stream of the device: losses on the way."""
         self.make = MAKES[kind]
         self.clock = SteppedTime()
         self.errors = SensorErrors(np.random.default_rng(1))
@@ -168,7 +168,7 @@ class SensorBench:
         return self
 
     def replug(self) -> None:
-        """Open the port anew, with a new driver, as after a crash."""
+        """Open the port again with a new sensor, as after a crash."""
         self.port = ChunkedPort(self.device, self.clock)
         self.clock.world = self.port
         self.sensor = SerialSensor(SerialLink(self.port), self.clock, self.driver)
@@ -187,7 +187,7 @@ class SensorBench:
 
 
 class BusBench:
-    """The sensor on the arm's bus, asked along with the positions of every cycle."""
+    """The sensor on the arm's bus, polled with the positions of every cycle."""
 
     def __init__(self, load=LOAD) -> None:
         self.load = load

@@ -40,7 +40,7 @@ def mounted(tool, angle=0.0, sign=1.0, bias=0.0):
 
 
 def reading(payload, R_base_7, force, tool, point=None):
-    """Return what the sensor says when the ground pushes with `force` (base frame).
+    """Return the reading when the ground pushes with `force` (base frame).
 
     Built from the statics of a body hung on the sensor, without the code under test.
     """
@@ -92,7 +92,7 @@ def test_a_foot_in_the_air_has_no_ground_force(example_tool):
     assert np.allclose(contact, 0.0, atol=EXACT)
 
 
-def test_a_hanging_foot_has_the_worked_example_reading(example_tool):
+def test_a_hanging_foot_has_the_reading_of_the_worked_example(example_tool):
     payload = mounted(example_tool)
     assert np.allclose(payload.weight(FOOT_DOWN)[:3], [0, 0, 4.4145], atol=EXACT)
     ground = np.array([0.0, 0.0, 2.943])
@@ -131,7 +131,7 @@ def test_taring_changes_only_the_bias(example_tool):
     assert not np.array_equal(tared.bias, payload.bias)
 
 
-def test_a_recording_is_computed_as_sample_by_sample(example_tool):
+def test_a_recording_is_computed_like_its_single_samples(example_tool):
     rng = np.random.default_rng(0)
     payload = mounted(example_tool, 0.4, -1.0, 0.3)
     raw = rng.normal(size=(20, 6))
@@ -223,7 +223,7 @@ def test_displacement_grows_from_the_far_end_and_height_above_the_plane(
 def test_ordinary_slip_has_positive_velocity_and_forces(
     example_tool, incline_deg, heading, sign
 ):
-    """From the sensor's bytes to the figure: the foot slides down the plate."""
+    """From the raw reading to traction: the foot slides down the plate."""
     frame = terrain(incline_deg, heading)
     x, _, z = frame.axes()
     tool = replace(example_tool, sensor_angle=0.4, sensor_sign=sign)

@@ -57,7 +57,7 @@ def test_spread_is_between_the_extreme_window_means():
     assert measure(samples(steps)).spread == pytest.approx(0.3)
 
 
-def test_the_last_window_counts_by_itself():
+def test_the_last_window_counts_fully():
     steps = np.repeat([0.0, 0.0, 0.0, 0.0, 0.4], 160)
     assert measure(samples(steps)).spread == pytest.approx(0.4)
 
@@ -184,24 +184,24 @@ def test_all_force_components_have_the_same_limit(axis):
     assert refused.value.spread == pytest.approx(0.6)
 
 
-@pytest.mark.parametrize(("promised", "is_enough"), [(400, True), (401, False)])
-def test_a_sensor_with_a_lower_nominal_rate_may_send_fewer_samples(promised, is_enough):
+@pytest.mark.parametrize(("nominal", "is_enough"), [(400, True), (401, False)])
+def test_a_sensor_with_a_lower_nominal_rate_may_send_fewer_samples(nominal, is_enough):
     slow = [
         replace(sample, t_ns=k * 5_000_000)
         for k, sample in enumerate(samples(noise(400)))
     ]
     if is_enough:
-        assert take_mean(slow, 0.5, promised).t_ns == slow[-1].t_ns
+        assert take_mean(slow, 0.5, nominal).t_ns == slow[-1].t_ns
         return
     with pytest.raises(TareError, match="Only 40 F/T samples in one"):
-        take_mean(slow, 0.5, promised)
+        take_mean(slow, 0.5, nominal)
 
 
 POSES = (attitude(0.1, 0.2, 0.3), attitude(0.1, -1.0, 0.3))
 
 
 def change_of(tool, seen_with):
-    """Compare what `seen_with` shows in two poses with what `tool` should show."""
+    """Compare readings of `seen_with` in two poses with those expected of `tool`."""
     readings = [seen_with.sign * seen_with.weight(R) + 7.0 for R in POSES]
     return weight_change(mounted(tool), POSES, readings)
 
@@ -235,7 +235,7 @@ def test_a_small_turn_is_within_tolerance(example_tool):
 
 
 def test_a_light_foot_also_reveals_a_turned_sensor(example_tool):
-    """Its error is below the limit of 1 N that a heavier one is held to."""
+    """Its error is below the limit of 1 N for heavier feet."""
     foot = replace(example_tool.foot, mass=0.2)
     light = replace(example_tool, foot=foot)
     change = change_of(light, mounted(light, angle=np.radians(20.0)))
@@ -260,7 +260,7 @@ def test_a_turn_is_visible_by_the_weight_across_the_axis():
 )
 @pytest.mark.parametrize("degrees", [-15.0, 15.0])
 def test_a_rotation_about_z_is_a_turn_in_any_direction(expected, degrees):
-    """And leaves nothing to explain, in no component of the force."""
+    """And no component of the force is left unexplained."""
     x, y, z = expected
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     seen = np.array([[c * x + s * y, c * y - s * x, z]])
@@ -312,7 +312,7 @@ def test_a_nearly_weightless_foot_is_reported_with_its_mass():
     assert change.cause is WeightCause.MASS
 
 
-def test_a_zero_reading_is_no_mass_rather_than_an_inverted_sign():
+def test_a_zero_reading_indicates_no_mass_rather_than_an_inverted_sign():
     change = compare_weights(np.array([[1.0, 2.0, 3.0]]), np.zeros((1, 3)))
     assert (change.scale, change.cause) == (0.0, WeightCause.MASS)
 

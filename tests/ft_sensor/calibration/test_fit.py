@@ -24,7 +24,7 @@ def payload(angle_deg=0.0, sign=1.0, mass=MASS):
 
 
 def readings(held, rotations, noise=0.0, seed=1):
-    """Return what the sensor shows, by the model that the loop uses."""
+    """Return the readings of the sensor, by the model that the loop uses."""
     rng = np.random.default_rng(seed)
     clean = held.bias + held.sign * held.weight(rotations)
     return clean + noise * rng.normal(size=clean.shape) * [1, 1, 1, 0.03, 0.03, 0.03]

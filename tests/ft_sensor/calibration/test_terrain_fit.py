@@ -61,7 +61,7 @@ def test_a_container_that_leans_to_one_side_has_a_roll():
     assert np.degrees(abs(fit_terrain(points).roll)) == pytest.approx(3.0, abs=0.1)
 
 
-def test_the_matrix_row_is_compared_with_the_touch():
+def test_the_matrix_row_is_compared_with_the_touched_plane():
     fit = fit_terrain(corners(frame(10.0)))
     check_terrain(fit, frame(10.9), is_forced=False)
     with pytest.raises(SettingsError, match=r"inclined by 10\.0 degrees.*says 15\.0"):

@@ -1,4 +1,4 @@
-"""A sensor on the network: datagrams on loopback, and what networks do to them."""
+"""Datagrams of a network sensor are read despite loss, reordering and damage."""
 
 import socket
 from contextlib import closing
@@ -38,7 +38,7 @@ def port(far_end):
 
 
 def reader_of(far_end, port):
-    """Let the port ask, and return its address."""
+    """Let the port send its request, and return its address."""
     port.write(ati.encode_request(ati.STREAM))
     data, reader = far_end.recvfrom(100)
     assert ati.decode_request(data) == (ati.STREAM, 0)
@@ -178,7 +178,7 @@ def lossy_bench(**shares):
 
 
 class FuzzedNetwork(LossyNetwork):
-    """Packets of chance bytes among those of the sensor, once it is told to."""
+    """A network with random packets among those of the sensor, once `is_fuzzed`."""
 
     is_fuzzed = False
     asked_ns = 0
@@ -203,10 +203,10 @@ def test_a_poor_network_costs_only_the_lost_packets():
     assert network.counts["lost"] > 50
     assert network.counts["doubled"] > 50
     assert network.counts["overtaken"] > 50
-    # One that was overtaken by a packet of an earlier read is lost, too.
+    # A packet overtaken by one of an earlier read is lost, too.
     assert network.counts["lost"] <= counters.lost - before.lost
-    most = network.counts["lost"] + network.counts["overtaken"]
-    assert counters.lost - before.lost <= most
+    largest = network.counts["lost"] + network.counts["overtaken"]
+    assert counters.lost - before.lost <= largest
     assert len(found) == len({sample.counter for sample in found})
     assert counters.jumps == 0
     mean = np.mean([sample.wrench for sample in found], axis=0)
@@ -266,7 +266,7 @@ def test_a_repeatedly_unplugged_network_is_read_again():
 
     for k in range(20):
         assert any(sample.is_valid for sample in polled(100 * MS))
-        bench.device.go_silent()  # UDP tells nothing of a cable that is pulled
+        bench.device.go_silent()  # UDP does not report an unplugged cable
         polled(400 * MS)
         assert sensor.sensor is None
         bench.device.speak()

@@ -11,7 +11,7 @@ from ft_sensor.serial_line.link import SerialLink, latency_timer_warning, open_p
 
 
 class ScriptedPort:
-    """A port that gives what it holds and fails as told."""
+    """A port that returns its stored bytes, or raises a scripted error."""
 
     def __init__(self, held: bytes = b"", error: Exception | None = None) -> None:
         self.held = held
@@ -166,5 +166,5 @@ def test_the_latency_timer_is_read_back(tmp_path, text, is_warned):
     assert ("latency timer 16 ms" in warning) == is_warned
 
 
-def test_an_adapter_without_latency_timer_is_fine(tmp_path):
+def test_an_adapter_without_latency_timer_gives_no_warning(tmp_path):
     assert latency_timer_warning("/dev/ttyACM0", tmp_path) == ""

@@ -1,4 +1,4 @@
-"""A sensor never measures a multiple of its range: such a sample is not valid."""
+"""A sample that is a multiple of the range of its sensor is not valid."""
 
 import pytest
 

@@ -204,7 +204,7 @@ def test_each_polling_cycle_has_the_sample_of_the_previous_one():
 
 
 def test_a_sample_is_stamped_with_its_sampling_time():
-    # The load tells the time: 7.3 N a second, no step of it in time with the cycles.
+    # The load encodes the time: 7.3 N/s, its steps not aligned with the cycles.
     begin_ns = SteppedClock().t_ns
     bench = Bench(lambda t_ns: ((t_ns - begin_ns) * 7.3e-9, 0, 0, 0, 0, 0)).started()
     samples = [sample for _, samples in bench.run(500) for sample in samples]

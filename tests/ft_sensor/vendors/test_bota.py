@@ -97,7 +97,7 @@ def test_device_time_unwraps_across_32_bits():
     assert TIMING.unwrap(100, 5 * 2**32 + 50) == 5 * 2**32 + 100
 
 
-def test_a_backward_step_of_device_time_stays_one():
+def test_a_backward_step_of_device_time_is_kept():
     assert TIMING.unwrap(2**32 - 10, 2**32 + 5) == 2**32 - 10
 
 

@@ -23,7 +23,7 @@ def sensor_on(port, clock, baudrate=460800, **settings) -> SerialSensor:
 
 
 class Bench:
-    """A sensor on a simulated device, both in one hand."""
+    """A sensor and its simulated device."""
 
     def __init__(self, options=BotaOptions(), line_xor=0, load=LOAD, **settings):  # noqa: B008
         self.clock = SteppedTime()
@@ -141,30 +141,30 @@ def test_a_rate_too_low_for_the_loop_is_refused():
 
 
 def test_a_slow_device_clock_does_not_set_the_rate():
-    # It counts 800 Hz with seconds that last 1.67.
+    # It counts 800 Hz in seconds that last 1.67 s.
     bench = Bench(BotaOptions(clock_error_ppm=-400_000))
     with pytest.raises(DeviceFaultError, match=r"sends 4[78]\d\.\d Hz"):
         bench.sensor.open()
 
 
 def test_a_rate_just_above_nominal_is_accepted():
-    told = Bench(BotaOptions(sinc=102)).opened().sensor.describe()
+    fields = Bench(BotaOptions(sinc=102)).opened().sensor.describe()
     # counted over a quarter of a second: good to a frame or two
-    assert float(told["measured_rate"].split()[0]) == pytest.approx(502.0, abs=5.0)
+    assert float(fields["measured_rate"].split()[0]) == pytest.approx(502.0, abs=5.0)
 
 
 def test_the_description_states_identity_and_rate():
-    told = Bench(BotaOptions(clock_error_ppm=50)).opened().sensor.describe()
-    assert told["serial_number"] == "20001"
-    assert told["name"] == "Fake F/T sensor"
-    assert told["filter"] == "sinc 64, FIR on"
+    fields = Bench(BotaOptions(clock_error_ppm=50)).opened().sensor.describe()
+    assert fields["serial_number"] == "20001"
+    assert fields["name"] == "Fake F/T sensor"
+    assert fields["filter"] == "sinc 64, FIR on"
     # One frame more or less in a quarter of a second is 4 Hz.
-    assert float(told["measured_rate"].split()[0]) == pytest.approx(800, abs=4)
+    assert float(fields["measured_rate"].split()[0]) == pytest.approx(800, abs=4)
 
 
 def test_the_description_of_a_running_stream_has_no_serial_number():
-    told = Bench(BotaOptions(is_running=True)).opened().sensor.describe()
-    assert told["serial_number"].startswith("unknown")
+    fields = Bench(BotaOptions(is_running=True)).opened().sensor.describe()
+    assert fields["serial_number"].startswith("unknown")
 
 
 @pytest.mark.parametrize("period_ns", [2 * MS, 500_000, 23 * MS])
@@ -199,7 +199,7 @@ def test_true_sampling_times_precede_their_time_stamps_by_at_most_a_period():
     ("status", "is_valid", "saturated"),
     [
         (BotaStatus.SKIPPED, True, 0),
-        (BotaStatus.OVER_RANGE, True, 0x3F),  # which axis, it does not say
+        (BotaStatus.OVER_RANGE, True, 0x3F),  # the axis is not reported
         (BotaStatus.INVALID, False, 0),
         (BotaStatus.RAW_GAUGE, False, 0),
     ],
@@ -213,7 +213,7 @@ def test_status_bits_reach_the_sample(status, is_valid, saturated):
 
 
 def shown_with(bench, axis, value):
-    """Let the device show `value` on one axis; the others go on measuring."""
+    """Let the device show `value` on one axis while the others keep measuring."""
     bench.device.faults.show = lambda wrench: (
         *wrench[:axis],
         value,

@@ -1,4 +1,4 @@
-"""Frames of every serial sensor: awkward chunks, damage, resynchronisation."""
+"""Frames of every serial sensor are found in any chunks and despite damage."""
 
 import random
 import struct
@@ -27,12 +27,12 @@ class Framing:
     """Frames of one make.
 
     Attributes:
-        header: that each begins with.
-        size: of each [bytes].
-        encode: a frame as bytes.
-        decode: the frame of bytes; None = there is none.
-        frames: any frame.
-        noisy: a frame with random numbers, different for each number.
+        header: first bytes of each frame.
+        size: of each frame [bytes].
+        encode: function from a frame to bytes.
+        decode: function from bytes to a frame, or None.
+        frames: strategy for any frame.
+        noisy: function to a frame of random numbers, different for each number.
     """
 
     header: bytes

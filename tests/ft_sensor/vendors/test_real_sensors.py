@@ -1,4 +1,4 @@
-"""Tare and true force on what two real sensors have sent."""
+"""Tares and forces of two real sensors agree with published values."""
 
 from pathlib import Path
 
@@ -45,7 +45,7 @@ def test_the_tare_of_a_real_sensor_removes_its_offset():
 
 
 @pytest.mark.parametrize(("name", "peak"), [("smooth_1", 331), ("smooth_2", 305)])
-def test_a_real_press_peaks_where_it_was_published(name, peak):
+def test_a_real_press_has_its_published_peak(name, peak):
     bias = np.array(take_mean(samples("zero"), LIMIT, rate=RATE).wrench)
     payload = Payload(0.0, np.zeros(3), np.eye(3), -1.0, bias)
     raw = np.array([sample.wrench for sample in samples(f"{name}_press")])

@@ -87,11 +87,11 @@ def test_a_count_out_of_range_is_refused():
 
 def test_the_sensor_is_identified_and_its_settings_are_read_back():
     bench = SensorBench("robotous").opened()
-    told = bench.sensor.describe()
-    assert told["model"] == "Robotous RFT60-HA01"
-    assert told["filter"] == "low-pass 150 Hz"
-    assert told["overloads"] == "0 0 0 0 0 0"
-    assert told["ranges"] == "150 150 200 4 4 4"
+    fields = bench.sensor.describe()
+    assert fields["model"] == "Robotous RFT60-HA01"
+    assert fields["filter"] == "low-pass 150 Hz"
+    assert fields["overloads"] == "0 0 0 0 0 0"
+    assert fields["ranges"] == "150 150 200 4 4 4"
 
 
 def test_a_model_with_another_torque_scale_shows_the_same_load():

@@ -1,4 +1,4 @@
-"""What every wrist sensor has to do, and what those on a serial line."""
+"""Every wrist sensor fulfils one contract, those with a frame stream a second one."""
 
 import contextlib
 from itertools import pairwise
@@ -53,9 +53,9 @@ def test_every_silent_sensor_gives_no_samples(any_bench):
 
 def test_every_sensor_reports_identity_and_sample_counters(any_bench):
     any_bench.run(20 * MS)
-    told = any_bench.sensor.describe()
-    assert {"model", "serial_number", "firmware", "measured_rate", "time"} <= set(told)
-    assert min(map(float, told["ranges"].split())) > 0
+    facts = any_bench.sensor.describe()
+    assert {"model", "serial_number", "firmware", "measured_rate", "time"} <= set(facts)
+    assert min(map(float, facts["ranges"].split())) > 0
     fields = any_bench.sensor.stream_metadata()
     assert any(int(count) > 0 for count in fields.values())
 
@@ -129,13 +129,13 @@ def test_an_unresponsive_sensor_is_reported(kind):
 
 
 def test_a_sensor_reports_its_identity_and_rate(kind):
-    told = SensorBench(kind).opened().sensor.describe()
+    facts = SensorBench(kind).opened().sensor.describe()
     rate = MAKES[kind].rate
-    assert {"model", "serial_number", "firmware", "filter", "time"} <= set(told)
-    assert float(told["nominal_rate"].split()[0]) == rate
+    assert {"model", "serial_number", "firmware", "filter", "time"} <= set(facts)
+    assert float(facts["nominal_rate"].split()[0]) == rate
     # One frame more or less in a quarter of a second.
-    assert float(told["measured_rate"].split()[0]) == pytest.approx(rate, abs=9)
-    assert len(told["ranges"].split()) == 6
+    assert float(facts["measured_rate"].split()[0]) == pytest.approx(rate, abs=9)
+    assert len(facts["ranges"].split()) == 6
 
 
 @pytest.mark.parametrize(
@@ -179,7 +179,7 @@ def test_silence_of_a_running_stream_gives_no_samples_and_ends(kind):
     bench.device.speak()
     later = bench.run(50 * MS)
     assert len(later) > 35
-    # Dated when it came, not when the silence began.
+    # Dated at its arrival, not at the start of the silence.
     assert bench.clock.now_ns() - later[-1].t_ns < 3 * MS
 
 
@@ -278,7 +278,7 @@ def test_a_reboot_is_a_gap_without_wrong_time_stamps(kind):
     bench.device.reset(bench.clock.now_ns())
     later = bench.run(3 * S)
     assert all(before.t_ns < after.t_ns for before, after in pairwise(later))
-    # One waits for its start; the others send as they were shipped: not to be used.
+    # One waits for its start; the others send with factory settings: unusable.
     assert not any(sample.is_valid for sample in later[1:])
     bench.replug()
     assert bench.opened().run(20 * MS)[-1].is_valid
@@ -293,7 +293,7 @@ def test_saturation_is_reported_by_axis(kind, axis):
         abs(LOAD[k]) / 2 if k == axis else 1e9 for k in range(6)
     )
     last = bench.run(20 * MS)[-1]
-    if kind in {"bota", "ati"}:  # it says that, not where; its range is far away
+    if kind in {"bota", "ati"}:  # these report a saturation, but not its axis
         assert last.saturated == 0x3F
     else:
         assert last.saturated == 1 << axis
@@ -305,7 +305,7 @@ def test_saturation_is_reported_by_axis(kind, axis):
 
 
 def test_sample_times_are_recovered_from_buffered_bytes(kind):
-    """An adapter that hands over every 16 ms what came meanwhile."""
+    """An adapter passes on its buffered bytes every 16 ms."""
     bench = SensorBench(kind, clock_error_ppm=50.0).opened()
     bench.run(6 * S, 16 * MS)
     start = bench.clock.now_ns()
