@@ -1,4 +1,4 @@
-"""The configurations that scenarios write are the shipped ones, changed as meant."""
+"""Scenarios write the shipped configurations with the intended changes."""
 
 import pytest
 
@@ -36,6 +36,6 @@ def test_each_make_is_configured_at_its_speed(room, make):
     assert (sensor.kind, sensor.baudrate) == (make.kind, make.baudrate)
 
 
-def test_a_line_that_the_shipped_file_lacks_is_refused(room):
+def test_a_change_of_a_line_missing_in_the_shipped_file_is_refused(room):
     with pytest.raises(ScenarioError, match="no such line"):
         room.write_config({"no such line": "anything"})

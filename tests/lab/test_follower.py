@@ -1,4 +1,4 @@
-"""What the host makes of a machine's console: results, silence, a sudden end."""
+"""The host reads results, hangs and crashes from the console of a machine."""
 
 from dataclasses import replace
 
@@ -19,8 +19,8 @@ PASSED = replace(SENT, processor=1.0)  # as the host completes it
 FINISHED = to_line(AllFinished(2.0))
 
 
-class Tape:
-    """Lines of a machine that then ends, or hangs."""
+class ScriptedConsole:
+    """The console of a machine that ends or hangs after its lines."""
 
     def __init__(self, *lines, is_hanging=False):
         self._lines = list(lines)
@@ -28,7 +28,7 @@ class Tape:
         self._is_hanging = is_hanging
 
     def processor_seconds(self):
-        """Each look at it finds a second more."""
+        """Return a second more at each call."""
         self._taken += 1.0
         return self._taken
 
@@ -44,52 +44,52 @@ class Tape:
         return None
 
 
-def follow(tape, *names):
-    return Follower(is_shown=False).follow(tape, names)
+def follow(machine, *names):
+    return Follower(is_shown=False).follow(machine, names)
 
 
-def test_results_come_out_in_the_order_in_which_they_came():
+def test_a_result_is_read_among_other_lines():
     lines = [to_line(ScenarioStarted("bench")), "[ 1.0] usb", to_line(SENT), FINISHED]
-    assert follow(Tape(*lines), "bench") == [PASSED]
+    assert follow(ScriptedConsole(*lines), "bench") == [PASSED]
 
 
-def test_a_timer_that_the_machine_found_is_corrected():
+def test_a_timer_reported_by_the_machine_is_corrected():
     found = TimerLocation(0x1FDC0, 0xFFFF_FFFF_8241_CB60)
-    tape = Tape(
+    machine = ScriptedConsole(
         to_line(found), to_line(ScenarioStarted("bench")), to_line(SENT), FINISHED
     )
-    assert follow(tape, "bench") == [PASSED]
-    assert tape.found == found
+    assert follow(machine, "bench") == [PASSED]
+    assert machine.found == found
 
 
 @pytest.mark.parametrize("is_hanging", [True, False])
-def test_the_scenario_in_which_a_machine_is_lost_is_named(is_hanging):
+def test_the_scenario_during_which_a_machine_is_lost_is_named(is_hanging):
     lines = [
         to_line(ScenarioStarted("bench")),
         to_line(SENT),
         to_line(ScenarioStarted("session")),
     ]
-    tape = Tape(*lines, "Oops: 0002", is_hanging=is_hanging)
-    passed, lost = follow(tape, "bench", "session", "never begun")
+    machine = ScriptedConsole(*lines, "Oops: 0002", is_hanging=is_hanging)
+    passed, lost = follow(machine, "bench", "session", "never begun")
     assert passed == PASSED
     assert (lost.name, lost.verdict) == ("session", Verdict.HUNG)
     assert "Oops" in lost.output
 
 
-def test_a_machine_that_never_boots_is_lost_in_its_boot():
-    (lost,) = follow(Tape("Kernel panic"), "bench")
+def test_a_machine_that_does_not_boot_is_reported_as_hung_in_its_boot():
+    (lost,) = follow(ScriptedConsole("Kernel panic"), "bench")
     assert (lost.name, lost.verdict) == ("boot", Verdict.HUNG)
     assert (lost.reason, lost.output) == (PANICKED, "Kernel panic")
 
 
-def test_a_machine_that_leaves_scenarios_out_is_not_taken_for_complete():
+def test_a_machine_that_skips_scenarios_is_reported_as_hung():
     lines = [to_line(ScenarioStarted("bench")), to_line(SENT), FINISHED]
-    results = follow(Tape(*lines), "bench", "session")
+    results = follow(ScriptedConsole(*lines), "bench", "session")
     assert results[-1].verdict is Verdict.HUNG
 
 
-class Starved(Tape):
-    """A machine of a busy host: silent for so many limits, each with a tenth of it."""
+class Starved(ScriptedConsole):
+    """A machine on a busy host: silent for `silences`, running a `share` of each."""
 
     def __init__(self, *lines, silences, share=0.1):
         super().__init__(*lines)
@@ -108,17 +108,17 @@ class Starved(Tape):
 
 
 def starved(**how):
-    tape = Starved(to_line(ScenarioStarted("bench")), to_line(SENT), FINISHED, **how)
-    return follow(tape, "bench")[0].verdict
+    machine = Starved(to_line(ScenarioStarted("bench")), to_line(SENT), FINISHED, **how)
+    return follow(machine, "bench")[0].verdict
 
 
-def test_a_machine_that_a_busy_host_gives_little_time_has_not_hung():
+def test_a_machine_slowed_by_a_busy_host_has_not_hung():
     assert starved(silences=8) is Verdict.PASSED
 
 
-def test_a_machine_has_hung_once_it_had_its_time():
+def test_a_machine_has_hung_once_it_used_its_processor_time():
     assert starved(silences=12) is Verdict.HUNG
 
 
-def test_a_machine_that_wants_no_time_has_hung():
+def test_a_machine_that_uses_no_processor_time_has_hung():
     assert starved(silences=2, share=0.001) is Verdict.HUNG

@@ -1,4 +1,4 @@
-"""The relay's frames between a socket and shared memory, over datagrams."""
+"""The relay moves frames between a socket and shared memory."""
 
 import ctypes
 import socket
@@ -29,7 +29,7 @@ def batch(ends, memory):
     return FrameBatch(ends[0], (ctypes.c_char * MEMORY_SIZE).from_buffer(memory))
 
 
-def test_all_frames_that_wait_come_in_one_call(ends, memory, batch):
+def test_all_waiting_frames_are_received_in_one_call(ends, memory, batch):
     for can_id, data in FRAMES:
         ends[1].send(FRAME.pack(can_id, len(data), data))
     exchange = Exchange(memory)
@@ -38,7 +38,7 @@ def test_all_frames_that_wait_come_in_one_call(ends, memory, batch):
     assert batch.receive() == 0
 
 
-def test_all_frames_of_an_answer_leave_in_order(ends, memory, batch):
+def test_all_frames_of_an_answer_are_sent_in_order(ends, memory, batch):
     Exchange(memory).answer(9, FRAMES, b"abc")
     assert Exchange(memory).answered() == (9, len(FRAMES), b"abc")
     batch.send(len(FRAMES))
@@ -47,7 +47,7 @@ def test_all_frames_of_an_answer_leave_in_order(ends, memory, batch):
     assert batch.lost == 0
 
 
-def test_frames_that_the_bus_does_not_take_are_counted(ends, memory, batch):
+def test_frames_refused_by_the_bus_are_counted(ends, memory, batch):
     memory[FRAMES_OUT_AT : FRAMES_OUT_AT + FRAME.size] = FRAME.pack(1, 0, b"")
     ends[0].setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1)
     for _ in range(20):
@@ -55,7 +55,7 @@ def test_frames_that_the_bus_does_not_take_are_counted(ends, memory, batch):
     assert batch.lost > 0
 
 
-def test_a_bus_that_is_gone_is_an_error(ends, batch):
+def test_a_closed_bus_is_an_error(ends, batch):
     ends[1].close()
     with pytest.raises(OSError, match="can: "):
         batch.send(1)

@@ -1,4 +1,4 @@
-"""The archive of the first root, unpacked by a reader of its own."""
+"""The archive of the initramfs is unpacked by an independent reader."""
 
 import stat
 
@@ -23,7 +23,7 @@ def unpack(archive):
         files[name] = (mode, archive[start : start + size], tuple(device))
 
 
-def test_files_of_every_length_come_out_as_they_went_in():
+def test_files_of_every_length_round_trip():
     contents = [b"x" * n for n in range(9)]
     entries = [
         Entry("n" * (n + 1), stat.S_IFREG | 0o644, content)

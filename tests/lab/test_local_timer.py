@@ -1,4 +1,4 @@
-"""What is written where through QEMU's gdb stub, and what is not touched."""
+"""The timer of a known kernel is corrected through QEMU's gdb stub, no other one."""
 
 import socket
 import struct
@@ -14,22 +14,22 @@ FACTOR, LONGEST = 268_434_382, 34_359_875_825
 
 
 class Stub:
-    """A debugger's other end: a little memory, a machine that stops unasked."""
+    """A gdb stub with a little memory, whose machine stops at the connection."""
 
     def __init__(self, path, factor=FACTOR, shift=32):
         self.memory = {OFFSETS: struct.pack("<Q", AREA)}
         self.memory[DEVICE] = struct.pack("<32xQQII", LONGEST, 1000, factor, shift)
         self.written = {}
         self.is_detached = False
-        self._door = socket.socket(socket.AF_UNIX)
-        self._door.bind(str(path))
-        self._door.listen()
+        self._listener = socket.socket(socket.AF_UNIX)
+        self._listener.bind(str(path))
+        self._listener.listen()
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
 
     def _serve(self):
-        link, _ = self._door.accept()
-        with link, self._door:
+        link, _ = self._listener.accept()
+        with link, self._listener:
             link.sendall(_packet("T05thread:01;"))
             data = b""
             while more := link.recv(4096):
@@ -61,7 +61,7 @@ def path(tmp_path):
     return tmp_path / "debugger"
 
 
-def test_a_slower_kernel_counts_more_of_the_timer_in_a_nanosecond(path):
+def test_the_timer_of_a_slowed_kernel_is_scaled(path):
     stub = Stub(path)
     correct(path, EVENTS, OFFSETS, 6)
     stub.close()
@@ -73,7 +73,7 @@ def test_a_slower_kernel_counts_more_of_the_timer_in_a_nanosecond(path):
 
 
 @pytest.mark.parametrize("other", [{"shift": 22}, {"factor": 0}, {"factor": 2**31}])
-def test_another_kernel_is_left_as_it_is(path, other):
+def test_another_kernel_is_not_changed(path, other):
     stub = Stub(path, **other)
     with pytest.raises(DebuggerError, match="not as expected"):
         correct(path, EVENTS, OFFSETS, 6)

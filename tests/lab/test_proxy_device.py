@@ -1,4 +1,4 @@
-"""The proxy device's answers to messages as QEMU 7.2 sends them."""
+"""The proxy device answers messages as QEMU 7.2 sends them."""
 
 import os
 import socket
@@ -69,7 +69,7 @@ def emulator():
     emulator.end()
 
 
-def test_the_device_has_a_name_and_one_page_of_registers(emulator):
+def test_the_device_has_an_identity_and_one_page_of_registers(emulator):
     assert (emulator.config(0, 2), emulator.config(2, 2)) == PCI_ID
     for offset in (0x10, 0x14, 0x18, 0x1C, 0x20, 0x24, 0x30):
         emulator.config(offset, 4, 0xFFFF_FFFF)
@@ -84,17 +84,17 @@ def test_a_word_is_read_at_its_offset_in_any_pieces(emulator, piece):
     assert emulator.read == [8]
 
 
-def test_descriptors_of_memory_are_closed_and_not_answered(emulator):
+def test_descriptors_of_memory_are_closed_without_an_answer(emulator):
     mine, theirs = os.pipe()
     data = _HEAD.pack(_MEMORY, 0, 192) + bytes(192)
     socket.send_fds(emulator.link, [data], [theirs])
     assert emulator.ask(_RESET) == 0  # the next answer is the next message's
     os.close(theirs)
-    assert os.read(mine, 1) == b""  # nobody has the other end
+    assert os.read(mine, 1) == b""  # the other end is closed
     os.close(mine)
 
 
-def test_a_message_of_another_protocol_ends_it():
+def test_a_message_of_another_protocol_closes_the_connection():
     emulator = Emulator()
     emulator.link.sendall(_HEAD.pack(_READ, 0, 1 << 20))
     assert emulator.link.recv(1) == b""

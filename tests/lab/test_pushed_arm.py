@@ -33,7 +33,7 @@ WANTED = {"row": "TF", "seed": "1", "line": "", "friction": "0.02", "wrong": ""}
 
 
 class Caller:
-    """A relay whose host asks for positions in every cycle."""
+    """A relay whose host requests positions in every cycle."""
 
     def __init__(self):
         self.memory = bytearray(MEMORY_SIZE)
@@ -43,7 +43,7 @@ class Caller:
         self.calls = 0
         self.asked_ns = _START_NS + _ASKED_NS
         self.sent = []
-        self.said = {}  # last data by identifier
+        self.latest = {}  # last data by identifier
 
     def say(self, call, text):
         self.exchange.ask(self.t_ns, 0, b"")
@@ -51,7 +51,7 @@ class Caller:
         return self.far.call(call)
 
     def step(self):
-        """Sleep until a frame comes or the answer said; make one call."""
+        """Sleep until the next request or wake-up, then make one call."""
         self.calls += 1
         self.t_ns = max(self.t_ns, min(self.asked_ns, self.wake_ns))
         count = int(self.t_ns >= self.asked_ns)
@@ -68,7 +68,7 @@ class Caller:
         rows = FRAME.iter_unpack(self.memory[FRAMES_OUT_AT:end])
         rows = [(can_id, data[:length]) for can_id, length, data in rows]
         self.sent += [(self.t_ns, can_id) for can_id, _ in rows]
-        self.said |= dict(rows)
+        self.latest |= dict(rows)
 
 
 @pytest.fixture
@@ -100,11 +100,11 @@ def test_seven_positions_leave_together_within_a_cycle(caller):
         assert len(set(times)) == 1
         # as long as the wire needs, before the loop looks for them
         assert 500_000 < times[0] - first_ns - cycle * PERIOD_NS < 700_000
-    assert caller.calls <= 3 * _CYCLES + 2  # the first comes at once
+    assert caller.calls <= 3 * _CYCLES + 2  # the first call is immediate
 
 
 @pytest.mark.parametrize("line", ["nonsense", "prepare a trial"])
-def test_a_line_that_is_not_known_is_refused_in_words(caller, line):
+def test_an_unknown_line_is_refused_with_a_message(caller, line):
     assert caller.say(Call.DO, line) != DONE
     assert "Error" in caller.exchange.message()
     assert caller.say(Call.DO, "lift") == DONE
@@ -115,10 +115,10 @@ def positions(caller, seconds):
     end_ns = caller.t_ns + round(seconds * 1e9)
     while caller.t_ns < end_ns:
         caller.step()
-    return [caller.said[position_reply_id(node)] for node in MOTOR_NODES]
+    return [caller.latest[position_reply_id(node)] for node in MOTOR_NODES]
 
 
-def test_hands_take_orders_as_at_an_arm_that_is_served_by_the_command(caller):
+def test_hands_obey_commands_as_at_a_served_arm(caller):
     before = positions(caller, 0.1)
     assert positions(caller, 0.4)[0] == before[0]  # held by one hand it does not turn
     assert caller.say(Call.DO, "pose 0.1 -1.9 0.1 2.9 0.1 0.5 0.1 0.3") == DONE
@@ -128,7 +128,7 @@ def test_hands_take_orders_as_at_an_arm_that_is_served_by_the_command(caller):
     assert caller.say(Call.DO, "pose 1 2") != DONE
 
 
-def test_a_wrong_arm_differs_as_the_catalogue_says(files):
+def test_a_wrong_arm_reports_another_position(files):
     of_joint_4 = []
     for wrong in ("", "encoder-4-reversed"):
         caller = Caller()
@@ -138,24 +138,24 @@ def test_a_wrong_arm_differs_as_the_catalogue_says(files):
     assert of_joint_4[0] != of_joint_4[1]
 
 
-def test_a_call_of_an_offset_that_means_nothing_is_refused(caller):
+def test_a_call_of_an_unknown_number_is_refused(caller):
     assert caller.far.call(4) != DONE
     assert "4 is not a valid Call" in caller.exchange.message()
 
 
-def test_a_call_with_more_frames_than_there_is_room_for_is_refused(caller):
+def test_a_call_with_too_many_frames_is_refused(caller):
     caller.exchange.ask(caller.t_ns, MAX_FRAMES + 1, b"")
     assert caller.far.call(Call.ADVANCE) != DONE
     assert f"{MAX_FRAMES + 1} frames" in caller.exchange.message()
 
 
-def test_a_call_before_anything_is_served_is_refused():
+def test_a_call_before_an_arm_is_served_is_refused():
     caller = Caller()
     assert caller.say(Call.DO, "lift") != DONE
     assert "nothing is served" in caller.exchange.message()
 
 
-def test_a_sensor_alone_says_what_is_due(files):
+def test_a_sensor_without_an_arm_sends_its_data(files):
     caller = Caller()
     rig = files["rig"].replace('kind = "barrett" ', 'kind = "bota" ')
     rig = rig.replace("[ft_sensor]", '[ft_sensor]\nport = "/dev/ttyUSB0"\nsinc = 64')

@@ -1,4 +1,4 @@
-"""The lines of verdicts on the terminal."""
+"""Verdicts are shown as lines on the terminal."""
 
 from lab.report import missed_cycles_line, result_line, summary
 from lab.results import ScenarioResult, Verdict
@@ -36,16 +36,16 @@ def kept(cycles, missed):
     return ScenarioResult("session", Verdict.PASSED, 1.0, figures)
 
 
-def test_cycles_of_all_scenarios_count_together():
+def test_cycles_of_all_scenarios_are_added_up():
     words = missed_cycles_line([kept(60_000, 0), PASSED, kept(40_000, 2)])
     assert "2 of 100000" in words
     assert "20 ppm" in words
 
 
-def test_none_missed_is_only_as_good_as_their_number():
+def test_without_a_missed_cycle_the_bound_follows_from_their_number():
     # Of 3 / n misses a cycle, 95 % of all runs of n cycles would show one.
     assert "below 30 ppm" in missed_cycles_line([kept(100_000, 0)])
 
 
-def test_without_trials_nothing_is_said_of_cycles():
+def test_without_trials_no_missed_cycles_are_reported():
     assert "ppm" not in missed_cycles_line([PASSED])

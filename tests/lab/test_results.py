@@ -20,13 +20,13 @@ RESULT = ScenarioResult(
 @pytest.mark.parametrize(
     "message", [RESULT, ScenarioStarted("session"), AllFinished(2.5)]
 )
-def test_a_message_survives_the_console(message):
+def test_a_message_round_trips_through_the_console(message):
     line = to_line(message)
     assert "\n" not in line
     assert from_line(line) == message
 
 
-def test_a_kernel_message_before_the_mark_is_passed_over():
+def test_a_kernel_message_before_the_mark_is_skipped():
     assert from_line("[    1.25] usb 1-1: new " + to_line(RESULT)) == RESULT
 
 
@@ -43,7 +43,7 @@ def test_a_kernel_message_before_the_mark_is_passed_over():
         to_line(RESULT)[:-20],
     ],
 )
-def test_what_is_no_message_is_none(line):
+def test_other_lines_are_not_messages(line):
     assert from_line(line) is None
 
 
@@ -57,5 +57,5 @@ def test_what_is_no_message_is_none(line):
         (Verdict.SURPRISING, False),
     ],
 )
-def test_a_known_defect_is_fine_until_it_is_mended(verdict, is_fine):
+def test_only_passed_and_expected_verdicts_are_fine(verdict, is_fine):
     assert verdict.is_fine is is_fine

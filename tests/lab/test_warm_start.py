@@ -1,6 +1,6 @@
-"""Processes that are forked where others are executed, each tried in one of its own.
+"""A forked process behaves like an executed one.
 
-A test runner has threads; what forks here is an interpreter that has none.
+Each test forks an interpreter without threads; a test runner has some.
 """
 
 import subprocess
@@ -48,17 +48,17 @@ def outcome(code):
         ),
     ],
 )
-def test_it_ends_as_an_interpreter_does(how, expected):
+def test_a_forked_process_exits_like_an_interpreter(how, expected):
     assert outcome(f"def run(): {how}\ntell(run)") == expected
 
 
-def test_it_has_the_arguments_of_its_command():
+def test_a_forked_process_has_the_arguments_of_its_command():
     assert outcome("def run(): print(sys.argv)\ntell(run)") == (
         "0 ['traction', 'check'] []"
     )
 
 
-def test_it_has_the_handlers_of_a_fresh_process():
+def test_a_forked_process_has_the_signal_handlers_of_a_fresh_one():
     code = """\
 signal.signal(signal.SIGTERM, signal.SIG_IGN)
 def run():
@@ -70,7 +70,7 @@ tell(run)
     assert outcome(code) == "0  []"
 
 
-def test_it_has_no_descriptor_that_it_was_not_given():
+def test_a_forked_process_inherits_no_other_descriptor():
     code = """\
 read, write = os.pipe()
 def run():
@@ -81,7 +81,7 @@ tell(run, pass_fds=(read,))
     assert outcome(code) == "1  ['OSError: [Errno 9] Bad file descriptor']"
 
 
-def test_it_keeps_the_descriptors_that_it_is_given():
+def test_a_forked_process_keeps_the_descriptors_it_is_given():
     code = """\
 read, write = os.pipe()
 def run(): os.write(write, b"from the child")
@@ -91,7 +91,7 @@ print(os.read(read, 99))
     assert outcome(code) == "0  []\nb'from the child'"
 
 
-def test_a_killed_one_is_reported_as_killed():
+def test_a_killed_process_is_reported_as_killed():
     code = """\
 def run():
     print("here", flush=True)
@@ -104,7 +104,7 @@ print(process.wait(20))
     assert outcome(code) == "-9"
 
 
-def test_what_it_starts_of_the_program_is_forked_with_its_own_environment():
+def test_a_child_of_a_forked_process_has_its_own_environment():
     code = """\
 marker = ["loaded here"]
 sys.modules["marked"] = marker
