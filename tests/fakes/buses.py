@@ -26,7 +26,7 @@ class InProcess:
 
 
 class LimitedClock(SteppedClock):
-    """Waits no longer than it was told to, whatever the deadline."""
+    """Waits no longer than its limit, whatever the deadline."""
 
     limit_ns = 0
 
@@ -35,7 +35,7 @@ class LimitedClock(SteppedClock):
 
 
 class Served:
-    """A server on stepped time: the kernel hands over what is sent at once."""
+    """A server on stepped time; the kernel delivers its frames at once."""
 
     def __init__(self, options, port):
         self.clock, self.motors = LimitedClock(), Motors(COUNTS)

@@ -1,6 +1,6 @@
-"""A point on springs instead of an arm: the terrain and the hand by themselves.
+"""A point on springs instead of an arm, to test terrain and hand alone.
 
-Two masses and a little drag stand in for the arm, and a sensor for the wrist's.
+Two masses and a little drag replace the arm, and a simulated sensor the wrist's.
 """
 
 import math
@@ -88,7 +88,7 @@ class PointFoot:
         return F_t, F_n
 
     def cycle(self) -> None:
-        """Advance by 2 ms and note what encoders and sensor show."""
+        """Advance by 2 ms and record the readings of encoders and sensor."""
         before = self.vx, self.vz
         forces = [self.substep() for _ in range(SUBSTEPS)]
         F_t, F_n = (sum(column) / SUBSTEPS for column in zip(*forces, strict=True))
@@ -109,7 +109,7 @@ class PointFoot:
         return row * round(PERIOD * 1e9)
 
     def run(self) -> TractionSeries:
-        """Push across the container and return what was recorded."""
+        """Push across the container and return the recorded series."""
         arrived = 0.0
         while arrived < REST_AFTER and len(self.rows) * PERIOD < LONGEST:
             self.cycle()

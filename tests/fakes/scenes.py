@@ -1,4 +1,4 @@
-"""Arm, foot and ground as the simulations of these tests have them."""
+"""Arm, foot and ground of the simulations in these tests."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""A clock that is told how far to go, and motors that only remember."""
+"""A stepped clock, and motors that only store positions and torques."""
 
 from collections.abc import Sequence
 from weakref import finalize
@@ -13,7 +13,7 @@ from wam.bus.transports import PythonCanTransport
 
 
 class SteppedClock:
-    """Simulated time: waiting advances the world and takes none."""
+    """Simulated time: waiting advances the world without wall-clock time."""
 
     def __init__(self) -> None:
         self.world: FakeCanBus | None = None
@@ -40,7 +40,7 @@ class SteppedClock:
 
 
 class Motors:
-    """Seven motors that stand where they are put."""
+    """Seven motors that stay where they are put."""
 
     def __init__(self, counts: Sequence[int] = (0,) * 7) -> None:
         self.position = list(counts)

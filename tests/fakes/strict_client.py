@@ -1,4 +1,4 @@
-"""A host of a WAM that knows the protocol's description and forgives nothing.
+"""A host of a WAM that follows the protocol's description and accepts no deviation.
 
 It shares no code with the project, so that an error in the common codec shows.
 """
@@ -28,7 +28,7 @@ TYPES = dict.fromkeys(PUCKS, 0) | {SAFETY: 2, SENSOR: 6}
 
 
 CYCLE = 0.002  # s
-# Joint angles, and what the motors make of them: gears 42, 28.25, 18, 9.7 and 14.93,
+# From joint angles to motor angles: gears 42, 28.25, 18, 9.7 and 14.93,
 # with a differential of 1.68 in the shoulder and of 1 in the wrist.
 HOME_Q = (0.0, -2.0, 0.0, 3.13, 0.0, 0.0, 0.0)
 SHOULDER, ELBOW, UPPER, WRIST_GEAR, FLANGE = 42.0, 18.0, 28.25, 9.7, 14.93
@@ -142,9 +142,9 @@ def position_id(node: int) -> int:
 
 
 class StrictClient:
-    """Drives an arm and raises DeviationError at the first thing that is wrong.
+    """Drives an arm and raises DeviationError at the first deviation.
 
-    `rest(duration_ns)` lets time pass. What has not come after 1 ms has not come.
+    `rest(duration_ns)` lets time pass. A reply later than 1 ms counts as missing.
     """
 
     def __init__(
@@ -155,10 +155,8 @@ class StrictClient:
         self._bus = bus
         self._rest = rest
 
-    # --- what a host does ---------------------------------------------------------
-
     def start(self) -> None:
-        """Find, wake, question and zero an arm that was just switched on, idle."""
+        """Find, wake, read and zero an idle arm that was just switched on."""
         self._enumerate()
         self._restore_limits()
         require(self._get(SAFETY, MODE) == IDLE, "the safety module is not idle")
@@ -172,7 +170,7 @@ class StrictClient:
         self._check_pendant()
 
     def expect_active(self) -> None:
-        """See that the pendant's button has reached every device."""
+        """Check that the pendant's button has reached every device."""
         require(self._get(SAFETY, MODE) == ACTIVE, "not active")
         replies = self._ask(WHOLE_ARM, MODE, map(reply_id, PUCKS))
         modes = {self._value(data, MODE, 4) for data in replies.values()}
@@ -180,7 +178,7 @@ class StrictClient:
         self._check_pendant()
 
     def run(self, cycles: int) -> None:
-        """Ask for positions and wrench and send torques, 500 times a second."""
+        """Request positions and wrench and send torques, 500 times a second."""
         for _ in range(cycles):
             expected = {position_id(node) for node in PUCKS}
             self._send(WHOLE_ARM, bytes((P,)))
@@ -199,7 +197,7 @@ class StrictClient:
         return joints(self._position(heard[position_id(node)]) for node in PUCKS)
 
     def move(self, offsets: tuple[float, ...], seconds: float) -> list[float]:
-        """Turn the joints from home by `offsets` [rad]; return where they are then.
+        """Turn the joints from home by `offsets` [rad]; return their angles then.
 
         Gravity of the bare arm and a PD in each joint, along a straight line that
         begins and ends at rest and takes four fifths of the time.
@@ -230,7 +228,7 @@ class StrictClient:
             self._check_wrench(self._hear((FORCE, TORQUE)))
 
     def read_temperatures(self) -> None:
-        """Ask every puck and the sensor how warm they are."""
+        """Request the temperatures of every puck and of the sensor."""
         for node in PUCKS:
             degc = (self._get(node, TEMP), self._get(node, THERM))
             require(all(-40 < t < 120 for t in degc), f"puck {node} at {degc} degc")
@@ -239,15 +237,13 @@ class StrictClient:
                 self._get(SENSOR, number)
 
     def finish(self) -> None:
-        """Idle the arm and see that it is."""
+        """Idle the arm and check that it is idle."""
         self._set(SAFETY, MODE, IDLE)
         require(self._get(SAFETY, MODE) == IDLE, "not idle though asked for")
         self.run(1)
         self._check_pendant()
         for node in self._nodes():
             require(self._stat(node) == 2, f"node {node} fell asleep")
-
-    # --- its steps ----------------------------------------------------------------
 
     def _nodes(self) -> list[int]:
         return [*PUCKS, *([SENSOR] if self.has_sensor else [])]
@@ -326,8 +322,6 @@ class StrictClient:
         fields = [word >> shift & 7 for shift in (0, 3, 6, 9, 12)]
         require(all(f in (1, 2, 4) for f in fields), f"PEN {word:08x} is not one-hot")
 
-    # --- questions and answers ----------------------------------------------------
-
     def _try_stat(self, node: int) -> int | None:
         self._send(node, bytes((STAT,)))
         self._rest(MS)
@@ -363,7 +357,7 @@ class StrictClient:
         self._bus.send(message)
 
     def _hear(self, ids: Iterable[int], within_ns: int = MS) -> dict[int, bytes]:
-        """Return what came from `ids`; each must speak once, and nobody else."""
+        """Return the replies of `ids`; each must reply once, and no other device."""
         wanted = set(ids)
         self._rest(within_ns)
         heard = self._collect(wanted)
@@ -380,9 +374,9 @@ class StrictClient:
             is_of_host = not can_id & 0x3E0
             if is_of_host or can_id == BROADCAST:
                 continue
-            said = f"{can_id:03x} {data.hex(' ')}"
-            require(can_id in wanted, f"unsolicited: {said}")
-            require(can_id not in heard, f"doubled: {said}")
+            text = f"{can_id:03x} {data.hex(' ')}"
+            require(can_id in wanted, f"unsolicited: {text}")
+            require(can_id not in heard, f"doubled: {text}")
             heard[can_id] = data
         return heard
 

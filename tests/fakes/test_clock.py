@@ -2,7 +2,7 @@ from fakes.clock import EPOCH_UTC_NS, START_NS, SteppedClock
 
 
 class World:
-    """Says something at fixed times and remembers how far it was told to go."""
+    """A world with events at fixed times that records the times it advances to."""
 
     def __init__(self, clock, *events):
         self.clock = clock

@@ -1,4 +1,4 @@
-"""One contract for every bus that the simulated pucks are reached by."""
+"""One contract for every bus that reaches the simulated pucks."""
 
 import can
 import pytest
@@ -24,17 +24,17 @@ def arm(request, tmp_path, vers):
     made = []
 
     def make(**options):
-        found = NetworkOptions(vers=(vers,) * 7, **options)
-        made.append(request.param(found, tmp_path))
+        network = NetworkOptions(vers=(vers,) * 7, **options)
+        made.append(request.param(network, tmp_path))
         return made[-1]
 
     yield make
-    for each in made:
-        each.close()
+    for rig in made:
+        rig.close()
 
 
 def say(arm, can_id, data, wait_ns=MS):
-    """Send a frame; return what arrives while `wait_ns` pass."""
+    """Send a frame; return the frames that arrive within `wait_ns`."""
     message = can.Message(arbitration_id=can_id, is_extended_id=False, data=data)
     arm.bus.send(message)
     arm.rest(wait_ns)
@@ -75,20 +75,20 @@ def test_a_tare_is_not_answered(arm):
 
 
 def test_a_get_has_one_reply_and_a_set_none(arm, vers):
-    one = arm()
+    rig = arm()
     number = property_number(Device.MOTOR, "MT", vers)
-    assert say(one, 3, encode_set(number, 1234)) == []
-    assert say(one, 3, encode_get(number)) == [(0x466, f"{0x80 | number:02x} 00 d2 04")]
+    assert say(rig, 3, encode_set(number, 1234)) == []
+    assert say(rig, 3, encode_get(number)) == [(0x466, f"{0x80 | number:02x} 00 d2 04")]
 
 
 @pytest.mark.parametrize("has_sensor", [False, True])
 def test_the_arm_reports_its_positions_in_node_order_and_then_the_wrench(
     arm, vers, has_sensor
 ):
-    one = arm(has_sensor=has_sensor)
+    rig = arm(has_sensor=has_sensor)
     request = encode_get(property_number(Device.MOTOR, "P", vers))
-    one.bus.send(can.Message(arbitration_id=8, is_extended_id=False, data=b"\x36"))
-    heard = say(one, 0x404, request)
+    rig.bus.send(can.Message(arbitration_id=8, is_extended_id=False, data=b"\x36"))
+    heard = say(rig, 0x404, request)
     positions = ["00 00 00", "3f 70 1f", "00 8f e0", "3f 70 88", *["00 00 00"] * 3]
     assert sorted(heard) == [
         *((0x403 + 0x20 * n, data) for n, data in enumerate(positions, 1)),
@@ -98,34 +98,34 @@ def test_the_arm_reports_its_positions_in_node_order_and_then_the_wrench(
 
 
 def test_torque_frames_move_an_active_arm_without_a_reply(arm, vers):
-    one = arm()
+    rig = arm()
     number = property_number(Device.MOTOR, "T", vers)
-    one.press("activate")
-    assert say(one, 0x401, encode_torques([1, -2, 3, -4], number)) == [
+    rig.press("activate")
+    assert say(rig, 0x401, encode_torques([1, -2, 3, -4], number)) == [
         (0x540, "88 00 02 00")
     ]
-    assert say(one, 0x402, encode_torques([5, -6, 7], number)) == []
-    assert one.motors.units == [1, -2, 3, -4, 5, -6, 7]
+    assert say(rig, 0x402, encode_torques([5, -6, 7], number)) == []
+    assert rig.motors.units == [1, -2, 3, -4, 5, -6, 7]
 
 
 def test_torque_frames_leave_an_idle_arm_alone(arm):
-    one = arm()
-    assert say(one, 0x401, encode_torques([1, -2, 3, -4])) == []
-    assert one.motors.units == [0] * 7
+    rig = arm()
+    assert say(rig, 0x401, encode_torques([1, -2, 3, -4])) == []
+    assert rig.motors.units == [0] * 7
 
 
 def test_in_e_stop_only_the_safety_module_is_on_the_bus(arm):
-    one = arm(has_sensor=True)
-    one.press("estop")
-    say(one, 1, b"\x05")  # fetches the broadcast as well
-    assert [say(one, node, b"\x05") for node in range(1, 9)] == [[]] * 8
-    assert say(one, 10, b"\x08") == [(0x546, "88 00 00 00")]
+    rig = arm(has_sensor=True)
+    rig.press("estop")
+    say(rig, 1, b"\x05")  # fetches the broadcast as well
+    assert [say(rig, node, b"\x05") for node in range(1, 9)] == [[]] * 8
+    assert say(rig, 10, b"\x08") == [(0x546, "88 00 00 00")]
 
 
 def test_power_returns_pucks_and_sensor_asleep(arm):
-    one = arm(has_sensor=True)
-    one.press("estop")
-    one.press("idle")
-    say(one, 9, b"\x05")  # fetches the broadcasts; nobody is there
-    found = {node: say(one, node, b"\x05") for node in range(1, 9)}
+    rig = arm(has_sensor=True)
+    rig.press("estop")
+    rig.press("idle")
+    say(rig, 9, b"\x05")  # fetches the broadcasts; node 9 is absent
+    found = {node: say(rig, node, b"\x05") for node in range(1, 9)}
     assert found == asleep(range(1, 9))

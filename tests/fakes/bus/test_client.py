@@ -164,7 +164,7 @@ def test_a_receive_with_time_out_waits_for_the_frame(hub, join):
     bus = join()
     assert bus.recv(0.01) is None
     hub.send(0x426, b"")
-    assert bus.recv(30.0).arbitration_id == 0x426  # it is there already
+    assert bus.recv(30.0).arbitration_id == 0x426  # the frame has already arrived
 
 
 def test_filters_of_python_can_are_respected(hub, join):

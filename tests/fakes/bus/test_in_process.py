@@ -29,14 +29,14 @@ def arrivals(rig):
 def test_nothing_arrives_before_its_last_bit(rig):
     begin_ns = rig.clock.t_ns
     rig.bus.send(message(1, b"\x05"))
-    # Request on the wire, 85 us of thought, reply on the wire.
+    # Request on the wire, 85 us of processing, reply on the wire.
     last_bit_ns = begin_ns + FRAME_NS[1] + 85_000 + FRAME_NS[4]
     rig.clock.sleep_until(last_bit_ns - 1)
     assert rig.bus.recv(0) is None
     rig.clock.sleep_until(last_bit_ns)
     reply = rig.bus.recv(0)
     assert reply.arbitration_id == 0x426
-    # A float of seconds keeps far better than a microsecond.
+    # A float of seconds resolves far less than a microsecond.
     assert reply.timestamp == pytest.approx(last_bit_ns / 1e9, abs=1e-7)
 
 

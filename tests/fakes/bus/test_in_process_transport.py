@@ -1,4 +1,4 @@
-"""Transport without messages: the same frames and errors as by way of python-can."""
+"""The in-process transport gives the same frames and errors as python-can."""
 
 import pytest
 
@@ -12,7 +12,7 @@ POSITIONS, VERS, PUCK = 0x404, b"\x00", 1
 
 
 class Ends:
-    """A network of its own behind a transport; what happened at it, in order."""
+    """A transport to its own network, with a log of its frames and errors."""
 
     def __init__(self, make):
         self.rig = Rig()
@@ -94,11 +94,11 @@ def more_frames_than_are_drained_at_once(ends):
 
 
 def an_error_behind_frames(ends):
-    """The interface goes down while its frames are taken; then it is up again."""
+    """Take the interface down while its frames are read, and restore it."""
     ends.say()
     ends.rig.rest(2 * MS)
     receive, faults = ends.rig.bus.recv, ends.faults
-    ends.faults.report_error(0x004, bytes(8))  # python-can's way from here on
+    ends.faults.report_error(0x004, bytes(8))  # python-can is used from here on
 
     def recv(timeout=None):
         message = receive(timeout)
@@ -139,7 +139,7 @@ def a_bus_that_was_shut_down(ends):
         a_bus_that_was_shut_down,
     ],
 )
-def test_a_transport_without_raw_frames_falls_back_to_python_can(happen):
+def test_both_transports_give_the_same_frames_and_errors(happen):
     short, long = Ends(InProcessTransport), Ends(PythonCanTransport)
     happen(short)
     happen(long)
@@ -147,9 +147,9 @@ def test_a_transport_without_raw_frames_falls_back_to_python_can(happen):
     assert any(short.log) or happen is a_bus_that_was_shut_down
 
 
-def test_a_sound_bus_is_not_asked_for_messages(monkeypatch):
+def test_a_sound_bus_is_used_without_python_can_messages(monkeypatch):
     ends = Ends(InProcessTransport)
-    for way in ("send", "recv"):
-        monkeypatch.setattr(ends.rig.bus, way, None)
+    for method in ("send", "recv"):
+        monkeypatch.setattr(ends.rig.bus, method, None)
     a_cycle(ends)
     assert [len(frames) for frames in ends.log] == [3, 4, 0, 2]

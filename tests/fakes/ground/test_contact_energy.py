@@ -1,4 +1,4 @@
-"""A foot that is led around a closed path must pay for it, never be paid."""
+"""Leading a foot around a closed path always costs energy."""
 
 import math
 from itertools import pairwise
@@ -72,7 +72,7 @@ def test_contact_creates_no_energy_over_a_closed_path(stones, foot, path):
         down_and_up = closed_path(make_ground(stones, foot, seed), HOME)
         around = closed_path(make_ground(stones, foot, seed), *PATHS[path])
         assert down_and_up < 0.0  # the bed damps
-        # 0.1 mJ of the 1 mJ and more that a path costs; sums over steps are not exact
+        # sums over steps are not exact: 0.1 mJ of the 1 mJ or more that a path costs
         assert around < down_and_up - 1e-4
 
 

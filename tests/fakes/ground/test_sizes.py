@@ -1,4 +1,4 @@
-"""Grounds of any grain size, and what words multiply."""
+"""Grounds of any grain size, and descriptors that scale their parameters."""
 
 from dataclasses import fields
 
@@ -59,5 +59,5 @@ def test_a_foot_brings_its_own_friction():
 
 
 def test_uphill_is_stronger_than_level_and_downhill_weaker():
-    # of the bed alone, weight along the slope not counted
+    # of the bed alone, without the weight along the slope
     assert slope_factor(0.17) < slope_factor(0.0) < slope_factor(-0.08)

@@ -21,12 +21,12 @@ def rng(seed=1):
 
 
 def standing(z):
-    """Return the motion of a foot that stands at the far end."""
+    """Return the motion of a foot at rest at the far end."""
     return (0.0, 0.0, z, 0.0, 0.0, 0.0, *NO_TURN)
 
 
 def drag(ground, *, travel, press=PRESS, speed=SPEED, mass=3.5):
-    """Pull a point foot along at even speed, pressed down; return rows F_t, F_n."""
+    """Pull a pressed point foot along at constant speed; return rows F_t, F_n."""
     z, vz = ground.surface(0.0), 0.0
     rows = []
     for i in range(round(travel / speed / DT)):
@@ -64,7 +64,7 @@ def test_a_plate_does_not_pull_a_lifted_foot():
 def test_no_ground_ever_pulls_the_foot_down():
     for ground in (Plate(PLATES["bare"], rng()), StoneBed(STONES["big"], 0.0, rng())):
         z = ground.surface(0.0) - 1e-4
-        away = (0.0, 0.0, z, 0.0, 0.0, 5.0, *NO_TURN)  # leaves faster than it damps
+        away = (0.0, 0.0, z, 0.0, 0.0, 5.0, *NO_TURN)  # faster than the ground
         assert ground.step(DT, away)[2] == 0.0
 
 
@@ -92,12 +92,12 @@ def test_a_bed_of_stones_loads_and_releases(stones):
     found = np.vstack(found)
     assert count >= 8
     assert len(found) >= 4
-    # what is left after a release is the skin of stones that roll: mu 0.28
+    # after a release only the rolling surface stones resist: mu 0.28
     assert np.median(found[:, 1] / found[:, 0]) < 0.3
     assert found[:, 0].max() < 4.0 * STONES[stones].J0
 
 
-def test_a_bed_of_stones_holds_a_foot_that_stands():
+def test_a_bed_of_stones_supports_a_foot_at_rest():
     bed = StoneBed(STONES["small"], 0.0, rng())
     z = bed.surface(0.0) - 0.002
     for _ in range(2000):
@@ -117,7 +117,7 @@ def test_a_bed_sinks_only_under_a_moving_foot():
     assert still.step(DT, deep)[2] > moving.step(DT, deep)[2] + 1.0
 
 
-def test_a_foot_lands_moving_on_a_bed_that_has_not_sunk():
+def test_a_foot_landing_elsewhere_meets_a_bed_that_has_not_sunk():
     bed, fresh = (StoneBed(STONES["big"], 0.0, rng(3)) for _ in range(2))
     drag(bed, travel=0.1)
     for _ in range(round(1.5 / DT)):
@@ -136,18 +136,18 @@ def test_a_slope_weakens_a_bed():
 
 
 def pushed_aside(footing, by, F_n=PRESS):
-    """Move the sole `by` [m] to its side; return what holds it against y [N]."""
+    """Move the sole `by` [m] to its side; return the lateral force against y [N]."""
     return -footing.step(0.001, (0.0,) * 4 + (by / 0.001,) + (0.0,) * 4, 0.0, F_n, 0.6)[
         1
     ]
 
 
 def test_a_bristle_stretches_to_its_limit_and_returns():
-    footing, most = Footing(2200.0, 0.0, 0.01, rng()), 0.6 * PRESS
+    footing, limit = Footing(2200.0, 0.0, 0.01, rng()), 0.6 * PRESS
     assert pushed_aside(footing, 0.001) == pytest.approx(2.2)
-    assert pushed_aside(footing, 0.009) == pytest.approx(most)
-    assert pushed_aside(footing, -0.001) == pytest.approx(most - 2.2)
-    assert pushed_aside(footing, -0.009) == pytest.approx(-most)
+    assert pushed_aside(footing, 0.009) == pytest.approx(limit)
+    assert pushed_aside(footing, -0.001) == pytest.approx(limit - 2.2)
+    assert pushed_aside(footing, -0.009) == pytest.approx(-limit)
 
 
 def test_pressing_does_not_restretch_a_slipped_bristle():
@@ -192,7 +192,7 @@ def test_force_acts_at_the_centre_of_pressure():
         assert arm[0] != 0.0
 
 
-def test_the_centre_of_pressure_wanders_as_far_as_it_should():
+def test_the_centre_of_pressure_wanders_by_its_stated_spread():
     offsets = []
     for seed in range(10):
         footing = Footing(2200.0, 0.010, 0.01, rng(seed))

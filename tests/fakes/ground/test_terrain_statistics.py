@@ -1,10 +1,10 @@
-"""Terrain and hand by themselves give the statistics of the model's reference runs.
+"""Terrain and hand alone give the statistics of the model's reference runs.
 
 The reference ran three independent sets of ten trials on eight terrains with a point
-foot; so does the long form here. Its own numbers are random too, hence the margins:
-where it prints a range over its sets, the range over these sets must meet it; where it
-prints a mean, these sets' mean lies within three standard errors; what it saw over
-twelve varied runs bounds what is pooled.
+foot; so does the long form here. The reference numbers are random too, hence margins:
+where a range over its sets is printed, the range over these sets must meet it; where a
+mean is printed, the mean of these sets lies within three standard errors. Its twelve
+varied runs bound the pooled values.
 """
 
 import os

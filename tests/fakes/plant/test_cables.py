@@ -1,4 +1,4 @@
-"""Motors that turn the joints through cables."""
+"""Motors that turn the joints through elastic cables."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ STUCK = replace(SLIPPERY, coulomb=np.full(7, 1e4), presliding=np.full(7, 1e-4))
 
 
 def free_arm(cables, motors):
-    """Return a released arm that nobody holds, above nothing."""
+    """Return a released, unsupported arm without ground."""
     options = PlantOptions(cables=cables, motors=motors, has_hand=False)
     plant = ArmPlant(CONSTANTS, TOOL, FRAME, START_Q, options)
     release(plant)
@@ -33,13 +33,13 @@ def free_arm(cables, motors):
 
 
 def angles(plant):
-    """Return the motors' angles as the encoders count them [rad of the joints]."""
+    """Return the motor angles by the encoders [rad of the joints]."""
     motor = np.array(plant.counts()) * 2.0 * np.pi / np.array(CONSTANTS.cts)
     return np.linalg.solve(CONSTANTS.j2mp, motor)
 
 
 def moved(cables, seconds=0.3):
-    """Return where a push of 4 N m at joint 4 takes an arm of `cables`."""
+    """Return the motion of an arm with `cables` pushed with 4 N m at joint 4."""
     plant = free_arm(cables, SLIPPERY)
     plant.disturbance[3] = 4.0
     list(float_for(plant, seconds))
@@ -67,8 +67,8 @@ def test_the_arm_swings_in_the_modes_of_its_cables(resonance):
     plant = free_arm(resonance, STUCK)
     list(float_for(plant, 1.0))
     plant.qd[:] = 0.02 * modes[:, 0] / np.abs(modes[:, 0]).max()
-    most = int(np.argmax(np.abs(modes[:, 0])))
-    speeds = [plant.qd[most] for _ in float_for(plant, 0.6)]
+    largest = int(np.argmax(np.abs(modes[:, 0])))
+    speeds = [plant.qd[largest] for _ in float_for(plant, 0.6)]
     ups = np.flatnonzero(np.diff(np.sign(speeds)) > 0)
     seen = 1.0 / (np.diff(ups).mean() * CYCLE_NS * 1e-9)
     assert seen == pytest.approx(np.sqrt(rates[0]) / (2.0 * np.pi), rel=0.03)

@@ -1,4 +1,4 @@
-"""Friction of the simulated motors: it holds, breaks away, and gives no energy."""
+"""Friction of the simulated motors holds, breaks away and adds no energy."""
 
 import numpy as np
 import pytest
@@ -94,7 +94,7 @@ def test_an_arm_is_reproducible_by_seed():
 def test_friction_under_the_weight_of_the_arm_has_the_stated_share():
     plant = make_plant(friction=1.0, seed=3)
     weight = np.linalg.solve(CONSTANTS.j2mp.T, MODEL.gravity(plant.q))
-    # the person's forearm hangs on the simulated arm, too
+    # the simulated arm carries the person's forearm, too
     assert plant.friction.load_at[1:4] == pytest.approx(np.abs(weight[1:4]), rel=0.5)
     assert plant.friction.load_at[1] > 0.1
 
@@ -111,7 +111,7 @@ CREEP = 50e-6 / 0.7  # rad of a joint 0.7 m from the sole
 
 
 def crept(load, tremor):
-    """Return how far joints creep in a minute [rad]; shares of Coulomb friction."""
+    """Return the creep of joints in a minute [rad]; shares of Coulomb friction."""
     motors = Motors(nominal())
     dry = motors.friction.coulomb
     for k in range(MINUTE):
@@ -141,12 +141,12 @@ def test_bristles_return_no_more_energy_than_stored(seed, dt):
         tau = 0.95 * tau + 0.8 * friction.coulomb * rng.standard_normal(7)
         motors.step(tau)
         least = min(least, motors.work)
-    assert np.abs(motors.angle).max() > 1.0  # they turned
+    assert np.abs(motors.angle).max() > 1.0  # the motors turned
     assert least >= -0.1 * stored(friction)
     assert motors.work > 10.0 * stored(friction)
 
 
-def test_light_motors_stay_still_at_steps_of_a_whole_cycle():
+def test_light_motors_come_to_rest_with_steps_of_a_whole_cycle():
     motors = Motors(nominal(), dt=0.002)
     motors.speed = 2.0 * TURNS
     for _ in range(2_000):
@@ -175,12 +175,12 @@ def test_breakaway_torque_does_not_depend_on_the_rate(rate, motors):
     assert broke[:motors] == pytest.approx(wanted[:motors], rel=0.06)
 
 
-@pytest.mark.parametrize("way", [1.0, -1.0])
-def test_a_sliding_motor_is_resisted_by_the_steady_torque_of_its_friction(way):
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_sliding_motor_is_resisted_by_the_steady_torque_of_its_friction(sign):
     friction = drawn(5)
     motors = Motors(friction)
-    # held at a speed by a stiff servo; the torque it needs is what resists
-    speed = way * 0.1 * TURNS
+    # a stiff servo keeps the speed; its torque equals the resistance
+    speed = sign * 0.1 * TURNS
     found, wanted = [], []
     for k in range(12_000):
         tau = 0.3 * INERTIA / DT * (speed - motors.speed) + motors.friction.steady(
@@ -237,8 +237,8 @@ def test_one_motor_of_a_differential_sticks_while_the_other_one_slides():
     assert turned[1] < nominal().presliding[1]
 
 
-def test_both_motors_of_a_differential_are_one_drive_to_the_implicit_step():
-    """Off the diagonal damping is explicit; steps four times shorter agree."""
+def test_motors_of_a_differential_are_coupled_in_the_implicit_step():
+    """Off-diagonal damping is explicit; steps four times shorter agree."""
     ends = []
     for substeps in (4, 16):
         plant = make_plant(friction=1.0, substeps=substeps)

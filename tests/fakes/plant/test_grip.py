@@ -1,4 +1,4 @@
-"""Hands on the links: they pose the simulated arm, turn joints to their stops."""
+"""Hands on the links pose the simulated arm and turn joints to their stops."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def pass_time(plant, seconds):
 
 
 def wait(plant, at_most=15.0):
-    """Let time pass until the hands are done; return how long it took [s]."""
+    """Let time pass until the hands are done; return the duration [s]."""
     begin_ns = plant.t_ns
     while not plant.is_hand_done:
         pass_time(plant, 0.05)
@@ -28,7 +28,7 @@ def wait(plant, at_most=15.0):
 
 
 def hold_at_goal(plant):
-    """Put the arm there, and let the hands hold it."""
+    """Set the arm to a pose in which the hands hold it."""
     plant.q = GOAL
     plant.pose(GOAL, 0.1)
     pass_time(plant, 0.4)
@@ -52,7 +52,7 @@ def test_the_path_to_a_pose_is_smooth_and_takes_its_duration():
     plant.pose(GOAL, 2.0)
     pass_time(plant, 1.0)
     half = (plant.q - start) / (GOAL - start)
-    # Half of a minimum-jerk way; shorted windings lag by 0.1 s at most.
+    # Half of a minimum-jerk path; shorted windings lag by 0.1 s at most.
     assert half == pytest.approx(np.full(7, 0.5), abs=0.1)
     assert np.abs(plant.qd).max() < 2.0 * np.abs(GOAL - start).max() / 2.0
 
@@ -139,7 +139,7 @@ def test_a_hung_weight_reads_as_its_weight_vertically(seed, down):
     hung = np.array(plant.sensor_load(plant.t_ns)) - free
     rotation = MODEL.sole_pose(plant.q)[1]
     shown = rotation @ hung[:3]
-    # The arm gives way by milliradians, which turns the foot's own weight.
+    # The arm yields by milliradians, which turns the foot's own weight.
     assert shown == pytest.approx(2.0 * 9.81 * np.array(down), abs=0.1)
     assert np.abs(plant.q - GOAL).max() < POSED
     plant.hang(0.0)
@@ -182,7 +182,7 @@ def test_a_push_moves_an_unsupported_arm():
         pass_time(plant, 0.2)
         return MODEL.sole_pose(plant.q)[0]
 
-    # 30 N for 0.2 s against some kg: centimetres, less what sinks either way.
+    # 30 N for 0.2 s against some kg: centimetres, less the sinking in both cases.
     aside = moved([0.0, 30.0, 0.0]) - moved([0.0, 0.0, 0.0])
     assert aside[1] > 0.01
 
@@ -196,7 +196,7 @@ def test_a_twist_is_measured_turns_joint_7_and_ends():
     early = np.array(plant.sensor_load(plant.t_ns)) - free
     pass_time(plant, 0.35)
     late = np.array(plant.sensor_load(plant.t_ns)) - free
-    # It is begun at 2 N m/s, and the foot's inertia takes a little of it.
+    # The twist grows at 2 N m/s, and the foot's inertia takes a little of it.
     assert early[5] == pytest.approx(0.2, abs=0.03)
     assert late[5] == pytest.approx(0.6, abs=0.03)
     assert plant.q[6] - before > 0.01

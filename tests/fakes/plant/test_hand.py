@@ -38,7 +38,7 @@ def test_the_hand_puts_the_foot_down_and_lets_it_rest(plant):
         forces.append(is_touching(plant))
     assert plant.hand.phase is HandPhase.REST
     assert is_touching(plant)
-    assert forces.index(True) > 100  # it was carried first
+    assert forces.index(True) > 100  # the foot was carried first
     assert abs(sole(plant)[0]) < 5e-3
     assert plant.foot_speed < 5e-3
 
@@ -66,14 +66,14 @@ def crossing(plant, pace, seconds):
 
 
 def test_a_slow_hand_is_slower_than_a_fast_one(plant):
-    ways = {}
+    forces = {}
     for name in ("slow", "steady", "fast"):
         hand = Hand(0.0005)
         hand.push(PACES[name], np.random.default_rng(3))
         for _ in range(8000):
             force = hand.step(AT_REST)[0]
-        ways[name] = force
-    assert ways["slow"] < ways["steady"] < ways["fast"]
+        forces[name] = force
+    assert forces["slow"] < forces["steady"] < forces["fast"]
 
 
 @pytest.mark.slow
@@ -86,7 +86,7 @@ def test_a_clumsy_hand_touches_the_frame_and_lifts_the_foot(plant):
     on_the_way = (x > 0.28) & (x < 0.32)
     assert z[on_the_way].max() > 0.010
     assert (F_n[on_the_way] == 0.0).any()
-    assert x[-1] > 0.34  # and goes on
+    assert x[-1] > 0.34  # and the foot goes on
 
 
 @pytest.mark.slow
@@ -108,7 +108,7 @@ def test_a_hand_yields_to_a_slip_after_its_reaction_time():
         hand.step(view())
     slip = [hand.step(view(0.010, 0.15))[0] for _ in range(1000)]
     start, early, late = (np.mean(part) for part in np.split(slip, [90, 190]))
-    assert early == pytest.approx(start, abs=2.0)  # nobody reacts within 0.1 s
+    assert early == pytest.approx(start, abs=2.0)  # no reaction within 0.1 s
     # at most half of the 20 N or so before the slip are left
     assert np.mean(slip[-200:]) < start - 6.0
     assert late < early
@@ -124,17 +124,17 @@ def test_a_stuck_hand_presses_harder_up_to_its_strongest():
 
 
 @pytest.mark.slow
-def test_a_hand_that_rests_pushes_no_more(plant):
+def test_a_resting_hand_stops_pushing(plant):
     x = crossing(plant, Pace(), 2.5)[:, 0]
-    assert x[-1] - x[-250] > 0.005  # it was pushing: 10 mm/s and more
+    assert x[-1] - x[-250] > 0.005  # the hand was pushing: 10 mm/s and more
     plant.hand.rest()
     for _ in float_for(plant, 1.0, virtual_mass=0.3):
         pass
-    where = sole(plant)[0]
+    position = sole(plant)[0]
     for _ in float_for(plant, 1.0, virtual_mass=0.3):
         pass
     assert plant.hand.phase is HandPhase.REST
-    assert abs(sole(plant)[0] - where) < 1e-3
+    assert abs(sole(plant)[0] - position) < 1e-3
 
 
 def test_a_released_hand_exerts_nothing(plant):
@@ -177,7 +177,7 @@ def test_the_same_generator_gives_the_same_push():
     assert forces(1) != forces(2)
 
 
-def test_a_push_grows_but_stays_within_what_a_person_exerts():
+def test_a_push_grows_but_stays_within_the_strength_of_a_person():
     hand = Hand(0.0005)
     hand.push(Pace(), np.random.default_rng(4))
     along = np.array([hand.step(AT_REST)[0] for _ in range(8000)])

@@ -38,7 +38,7 @@ def energies(plant):
 
 
 def forearm_inertia(q):
-    """Return what a point mass of 1 kg, 30 mm above the tool plate, adds to M."""
+    """Return the inertia that 1 kg, 30 mm above the tool plate, adds to M."""
     h = 1e-6
     steps = h * np.eye(7)
     columns = [
@@ -61,7 +61,7 @@ def test_an_idle_arm_stays_on_its_stand():
 
 
 def sunk(seconds, windings=1.0, **options):
-    """Return how far an idle arm has sunk that nothing bears [m]."""
+    """Return the distance that an unsupported idle arm has sunk [m]."""
     plant = make_plant(
         height=0.15, windings=windings, support=Support.NONE, has_hand=False, **options
     )
@@ -73,7 +73,7 @@ def sunk(seconds, windings=1.0, **options):
 
 def test_an_idle_arm_sinks_slowly_on_shorted_windings():
     assert 0.12 < sunk(0.5) < 0.16
-    assert sunk(1.0) > 1.8 * sunk(0.5)  # it goes on: nothing holds it
+    assert sunk(1.0) > 1.8 * sunk(0.5)  # the unsupported arm goes on sinking
 
 
 def test_an_arm_sinks_faster_the_less_its_windings_damp():
@@ -89,7 +89,7 @@ def test_an_arm_with_open_windings_falls():
     plant.hand.let_go()
     release(plant)
     plant.advance(S // 5)
-    # 0.2 s of free fall would be 0.2 m; drives and links hold it back
+    # 0.2 s of free fall would be 0.2 m; the inertia of drives and links slows it
     assert sole(plant)[2] < 0.15 - 0.03
 
 
@@ -107,7 +107,7 @@ def test_a_person_holding_an_arm_soon_supports_it():
     noticed = sole(plant)[2]
     plant.advance(plant.t_ns + 2 * S)
     assert 0.01 < before - noticed < 0.10
-    assert noticed - 0.01 < sole(plant)[2] < before  # it is lifted slowly
+    assert noticed - 0.01 < sole(plant)[2] < before  # the person lifts slowly
 
 
 def test_a_compensated_arm_without_friction_floats():
@@ -176,7 +176,7 @@ def test_a_joint_stop_stops_a_joint(joint, side):
         send(plant, MODEL.gravity(plant.q) + push)
         plant.advance(plant.t_ns + CYCLE_NS)
         farthest = max(farthest, side * (plant.q[joint] - stops[joint]))
-    # 3 N m at most against 2000 N m/rad, and the impact; it got there and stayed
+    # 3 N m at most against 2000 N m/rad, and the impact; the joint stays at its stop
     assert 0.0 < farthest < 0.05
     assert abs(plant.q[joint] - stops[joint]) < 0.05
     assert np.abs(plant.qd).max() < 5.0
@@ -202,7 +202,7 @@ def test_the_sensor_measures_the_weight_of_the_foot():
 
 
 def felt_in_base(plant):
-    """Return force and moment about the sole that the sensor feels, base frame."""
+    """Return measured force and moment about the sole in the base frame."""
     load = np.array(plant.sensor_load(plant.t_ns))
     rotation = MODEL.sole_pose(plant.q)[1]
     arm = TOOL.sole - [0.0, 0.0, TOOL.sensor_height]
@@ -227,7 +227,7 @@ def test_the_sensor_measures_the_inertia_of_the_foot():
 
 
 class Pusher:
-    """Ground that pushes as it is told."""
+    """A ground that pushes with a given wrench."""
 
     stiffness = 1.0
 

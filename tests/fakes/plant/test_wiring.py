@@ -1,4 +1,4 @@
-"""Cables and encoders of the simulated arm that are not as built."""
+"""Wrong cables and encoders of the simulated arm have their stated effects."""
 
 import numpy as np
 import pytest
@@ -33,8 +33,8 @@ def test_reversed_and_swapped_wiring_permute_the_motors():
 def test_swapped_encoders_report_the_other_motor_relative_to_home():
     home = np.full(7, 1000.0)
     wiring = Wiring(counts=swapped(4, 5), home=home)
-    told = wiring.reported_counts(home + np.array([0, 0, 0, 0, 10, 20, 0]))
-    assert told[4:6].tolist() == [1020.0, 1010.0]
+    reported = wiring.reported_counts(home + np.array([0, 0, 0, 0, 10, 20, 0]))
+    assert reported[4:6].tolist() == [1020.0, 1010.0]
 
 
 def test_a_torn_cable_stops_the_rotor_and_removes_joint_torque():

@@ -1,4 +1,4 @@
-"""What can go wrong on the simulated wire, one fault at a time."""
+"""Each fault of the simulated bus has its stated effect."""
 
 import errno
 from itertools import pairwise
@@ -32,7 +32,7 @@ def faults(rig):
 
 
 def ask(rig):
-    """Ask for all positions; return what arrives within two milliseconds."""
+    """Request all positions; return the replies within two milliseconds."""
     rig.link.send(0x404, b"\x30")
     rig.rest(2 * MS)
     return [(frame.can_id, bytes(frame.data)) for frame in rig.link.receive()]
@@ -58,7 +58,7 @@ def test_a_reproducible_share_of_replies_is_lost():
     assert lost == losses()
 
 
-def test_only_the_late_reply_is_late(rig, faults):
+def test_only_the_delayed_reply_is_late(rig, faults):
     faults.delay(THREE, 5 * MS)
     assert ids(ask(rig)) == [i for i in ALL if i != THREE]
     rig.rest(5 * MS)
@@ -84,8 +84,8 @@ def test_a_doubled_reply_arrives_twice(rig, faults):
 def test_a_corrupted_reply_differs_in_one_byte(rig, faults):
     (clean,) = [d for i, d in ask(rig) if i == THREE]
     faults.corrupt(THREE, byte=1)
-    (spoilt,) = [d for i, d in ask(rig) if i == THREE]
-    assert [a ^ b for a, b in zip(clean, spoilt, strict=True)] == [0, 0xFF, 0]
+    (damaged,) = [d for i, d in ask(rig) if i == THREE]
+    assert [a ^ b for a, b in zip(clean, damaged, strict=True)] == [0, 0xFF, 0]
 
 
 @pytest.mark.parametrize("load", [0.3, 0.6])
@@ -113,7 +113,7 @@ def test_a_flood_delays_replies_by_identifier_priority(rig, faults):
 
     first, last = FOREIGN_IDS
     alone = FRAME_NS[1] + 75_000 + 7 * FRAME_NS[3]
-    # Who loses can be on the wire already when the question comes, and the replies.
+    # A frame of lower priority may already occupy the wire.
     assert last_reply([last]) <= alone + 2 * FRAME_NS[8]
     assert last_reply([first]) > alone + 2 * FRAME_NS[8]
 
@@ -127,7 +127,7 @@ def test_an_interface_that_is_down_neither_sends_nor_receives(rig, faults):
     with pytest.raises(can.CanOperationError, match="down"):
         rig.bus.recv(0)
     faults.clear_faults()
-    assert rig.bus.recv(0) is None  # what waited is gone
+    assert rig.bus.recv(0) is None  # waiting frames are lost
     assert ids(ask(rig)) == ALL
 
 
@@ -138,15 +138,15 @@ def send(rig, can_id=0x404, data=b"\x30"):
 def test_a_bus_off_controller_accepts_frames_and_reports_once(rig, faults):
     faults.go_off()
     send(rig)
-    told = rig.bus.recv(0)
-    assert told.is_error_frame
-    assert error_names(told.arbitration_id, told.data) == {"bus-off"}
+    report = rig.bus.recv(0)
+    assert report.is_error_frame
+    assert error_names(report.arbitration_id, report.data) == {"bus-off"}
     rig.rest(2 * MS)
     assert rig.bus.recv(0) is None
     faults.clear_faults()
-    told = rig.bus.recv(0)
-    assert error_names(told.arbitration_id, told.data) == {"restarted"}
-    assert rig.bus.recv(0) is None  # what was sent meanwhile is gone
+    report = rig.bus.recv(0)
+    assert error_names(report.arbitration_id, report.data) == {"restarted"}
+    assert rig.bus.recv(0) is None  # frames sent meanwhile are lost
     assert ids(ask(rig)) == ALL
 
 
@@ -157,13 +157,13 @@ def test_unacknowledged_frames_wait_until_the_queue_is_full(rig, faults):
     with pytest.raises(can.CanOperationError) as refused:
         send(rig)
     assert refused.value.error_code == errno.ENOBUFS
-    told = rig.bus.recv(0)
-    assert error_names(told.arbitration_id, told.data) == {"passive"}
+    report = rig.bus.recv(0)
+    assert error_names(report.arbitration_id, report.data) == {"passive"}
     faults.clear_faults()
     send(rig)
     rig.rest(20 * MS)
     replies = [rig.bus.recv(0) for _ in range(12 * 7)]
-    assert None not in replies  # all that waited came out
+    assert None not in replies  # all waiting frames were sent
 
 
 def test_repairing_ends_every_bus_fault(rig, faults):
@@ -211,19 +211,21 @@ def test_a_faulted_monitor_can_be_cleared_once_repaired(rig, name, monitor, mode
 
 
 @pytest.mark.parametrize(
-    ("name", "request_", "ill", "well"),
+    ("name", "request_", "faulty", "sound"),
     [("puck-hot", 9, 72, 35), ("puck-error", 4, 7, 0)],
 )
-def test_a_faulty_puck_reports_its_fault_until_repaired(rig, name, request_, ill, well):
+def test_a_faulty_puck_reports_its_fault_until_repaired(
+    rig, name, request_, faulty, sound
+):
     def answer():
         rig.link.send(3, bytes((request_,)))
         rig.rest(MS)
         return rig.link.receive()[0].data[2]
 
     network_faults(rig.network)[name]()
-    assert answer() == ill
+    assert answer() == faulty
     clear_network_faults(rig.network)
-    assert answer() == well
+    assert answer() == sound
 
 
 def test_a_rebooted_puck_answers_no_positions_but_other_requests(rig):

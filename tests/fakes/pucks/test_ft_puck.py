@@ -15,7 +15,7 @@ REST = [0.0] * 6
 
 
 class Host:
-    """Talks to the sensor of a network without a bus between them."""
+    """Exchanges frames with the sensor of a network without a bus."""
 
     def __init__(self, load=REST, **options):
         self.load = list(load)
@@ -25,7 +25,7 @@ class Host:
         self.t_ns = 0
 
     def say(self, data, can_id=8):
-        """Send a frame; return what comes back within a millisecond."""
+        """Send a frame; return the replies within a millisecond."""
         self.network.receive(self.t_ns, can_id, bytes.fromhex(data))
         return self.hear(MS)
 
@@ -37,7 +37,7 @@ class Host:
         ]
 
     def wrench(self):
-        """Ask for force and torque; return them and the status."""
+        """Request force and torque; return them and the status."""
         force, torque = self.say("36")
         return (
             decode_force(bytes.fromhex(force[4:])),
@@ -82,8 +82,10 @@ def test_the_wrench_is_sampled_at_a_fixed_delay_after_the_request():
 def test_single_components_agree_with_the_frames():
     host = Host(LOAD)
     force, torque = host.say("36")
-    told = "".join(host.say(f"{n:02x}")[0][-5:].replace(" ", "") for n in range(48, 54))
-    assert told == (force[4:] + torque[4:]).replace(" ", "")
+    parts = "".join(
+        host.say(f"{n:02x}")[0][-5:].replace(" ", "") for n in range(48, 54)
+    )
+    assert parts == (force[4:] + torque[4:]).replace(" ", "")
 
 
 def test_readings_have_the_data_sheet_resolution():
@@ -118,7 +120,7 @@ def test_a_tare_is_not_answered_and_zeroes_the_present_load():
     assert host.wrench()[0][2] == pytest.approx(5.04, abs=0.002)
 
 
-def test_only_zero_tares():
+def test_only_a_set_to_zero_tares():
     host = Host(LOAD)
     host.say("b6 00 01 00 00 00")
     assert host.wrench()[0][0] == 1.0
@@ -144,12 +146,12 @@ def test_each_gauge_ends_at_the_range_of_its_axis(axis):
     force, torque, status = host.wrench()
     assert status == 0xC0 | 1 << axis
     shown = (*force, *torque)[axis]
-    # What the frame cannot carry is clipped; half a count of torque.
+    # Values beyond the frame are clipped; half a count of torque.
     assert shown == pytest.approx(min(RANGES[axis], 127.996), abs=0.001)
     assert host.say(f"{42 + axis:02x}")[0][-5:] == "ff 0f"
 
 
-def test_a_force_beyond_the_frame_is_clipped_though_no_gauge_complains():
+def test_a_force_beyond_the_frame_is_clipped_without_a_saturated_gauge():
     host = Host((0, 0, 130.0, 0, 0, 0))
     force, _, status = host.wrench()
     assert (force[2], status) == (0x7FFF / 256, 0)

@@ -16,7 +16,7 @@ STOPPED = NetworkOptions(safety_mode=SafetyMode.E_STOP)
 
 
 class Host:
-    """Talks to a network without a bus between them."""
+    """Exchanges frames with a network without a bus."""
 
     def __init__(self, options=None, counts=HOME_COUNTS):
         self.motors = Motors(counts)
@@ -24,7 +24,7 @@ class Host:
         self.t_ns = 0
 
     def say(self, can_id, data):
-        """Send a frame; return what comes back within a millisecond."""
+        """Send a frame; return the replies within a millisecond."""
         data = bytes.fromhex(data) if isinstance(data, str) else data
         self.network.receive(self.t_ns, can_id, data)
         return self.hear(MS)

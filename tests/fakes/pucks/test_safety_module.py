@@ -1,4 +1,4 @@
-"""What the simulated safety module watches: speed, bus voltage, and its limits."""
+"""The simulated safety module monitors speed and bus voltage by its limits."""
 
 import numpy as np
 import pytest
@@ -147,7 +147,7 @@ def test_a_lasting_excess_speed_removes_power():
     assert host.mode is SafetyMode.IDLE
     cycles = host.move(joint(1, 2.2), 300)
     assert host.mode is SafetyMode.E_STOP
-    assert 240 <= cycles <= 252  # 0.5 s less what the first movement took
+    assert 240 <= cycles <= 252  # 0.5 s less the first movement
     assert host.motors.is_idle
 
 
@@ -191,7 +191,7 @@ def test_an_arm_that_is_not_zeroed_is_judged_by_joint_speeds(number, speed, mode
 
 
 def jump(host):
-    """Let motor 1 stand elsewhere at once."""
+    """Move motor 1 to another position at once."""
     host.q = host.q + joint(1, 0.05)
 
 

@@ -22,7 +22,7 @@ FAST = BotaOptions(is_running=True, sinc=64)
 
 
 def ramp(t_ns: int) -> tuple[float, ...]:
-    """The load tells when it was asked for, in whole microseconds."""
+    """Return a load that encodes the time of its sampling in whole microseconds."""
     return (t_ns / 1000, 1.0, 2.0, 3.0, 4.0, 5.0)
 
 
@@ -39,7 +39,7 @@ def text_of(stream: SensorStream, t_ns: int) -> bytes:
 
 
 def configured(options: BotaOptions = FAST) -> SensorStream:
-    """A device in configuration mode at 100 ms, with nothing left to say."""
+    """Return a device in configuration mode at 100 ms, without pending output."""
     stream = bota_stream(ramp, options=options)
     stream.receive(50 * MS, b"C")
     stream.due(100 * MS)
@@ -62,7 +62,7 @@ def test_the_next_event_is_the_next_arrival():
         assert len(stream.due(event)) == 1
 
 
-def test_load_is_that_of_the_sampling_instant():
+def test_a_frame_has_the_load_of_its_sampling_instant():
     frames = frames_of(bota_stream(ramp, options=FAST), 100 * MS)
     assert [frame.wrench[0] for frame in frames] == [1250.0 * k for k in range(80)]
     assert all(frame.wrench[0] == frame.device_us for frame in frames)

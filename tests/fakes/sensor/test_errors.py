@@ -16,13 +16,13 @@ FREE = (0.0,) * 6
 
 
 def make_errors(seed=0, **scale) -> SensorErrors:
-    """A sensor with nothing but the errors of force in `scale`."""
+    """Return a sensor with only the force errors of `scale`."""
     force = ErrorScale(**(NOTHING | scale))
     return SensorErrors(np.random.default_rng(seed), force, QUIET)
 
 
 def errors_of(count: int, seed: int = 0, **scale) -> np.ndarray:
-    """What is shown under no load, 800 Hz, shape (count, 6)."""
+    """Return readings without load at 800 Hz, shape (count, 6)."""
     errors = make_errors(seed, **scale)
     return np.array([errors.apply(k * 1_250_000, FREE) for k in range(count)])
 
@@ -49,7 +49,7 @@ def test_a_zero_wanders_with_its_deviation_and_time_constant(name, time, gap_s):
         return shown[-1], errors.apply(2 * MS + int(gap_s * 1e9), FREE)[:3]
 
     before, after = np.hstack([around_gap(seed) for seed in range(400)])
-    # 1200 paths: a correlation is known to better than 1 / sqrt(1200) = 0.029, a
+    # 1200 paths: a correlation is known to within 1 / sqrt(1200) = 0.029, a
     # deviation to 0.021; warmth adds 0.3 x 0.15 N to the last axis, 0.1 % at most.
     assert before.std() == pytest.approx(1.0, abs=0.08)
     assert after.std() == pytest.approx(1.0, abs=0.08)
@@ -93,7 +93,7 @@ def test_a_tare_removes_the_present_reading():
         errors = make_errors(seed, walk=FORCE_ERRORS.walk, drift=FORCE_ERRORS.drift)
         tare = np.mean([errors.apply(k * 20 * MS, FREE)[:3] for k in range(50)], axis=0)
         remains.append(np.array(errors.apply(20 * S, FREE)[:3]) - tare)
-    # The drift has forgotten the tare: sqrt(0.22^2 + 0.21^2), and 0.06 of the walk.
+    # The drift is independent of the tare: sqrt(0.22^2 + 0.21^2), and 0.06 of the walk.
     # 450 values: known to 3.3 %, here at 4 sigma.
     assert np.std(remains) == pytest.approx(0.31, rel=0.13)
 
@@ -102,7 +102,7 @@ def test_a_shifted_zero_stays_until_the_shift_ends():
     errors = make_errors()
     before = errors.apply(0, FREE)[0]
     errors.shift = (1.5, 0.0, 0.0, 0.0, 0.0, 0.0)
-    # It shows within 10 ms.
+    # The shift appears within 10 ms.
     assert errors.apply(10 * MS, FREE)[0] == pytest.approx(before + 1.5, abs=0.01)
     assert errors.apply(S, FREE)[0] == pytest.approx(before + 1.5, abs=0.01)
     errors.shift = NO_SHIFT

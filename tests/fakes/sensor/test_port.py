@@ -24,7 +24,7 @@ class Time:
 
 
 class Ticker:
-    """Sends one letter every 10 ns and remembers what it was told."""
+    """Sends one letter every 10 ns and stores the bytes that it receives."""
 
     def __init__(self) -> None:
         self.sent_ns = 0

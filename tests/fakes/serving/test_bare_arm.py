@@ -1,4 +1,4 @@
-"""A program that knows the protocol and the weight of the arm moves a served one."""
+"""A program with the protocol and the weight of the arm moves a served arm."""
 
 from contextlib import closing
 
@@ -27,7 +27,7 @@ ARRIVED = 5e-3  # rad
 
 
 class ServedArm:
-    """An arm served on a socket, on stepped time: a stall takes none of it."""
+    """An arm served on a socket, on stepped time: a stall takes no simulated time."""
 
     def __init__(self, folder, *, tool=None, has_hand=False, **found):
         self.clock = LimitedClock()
@@ -92,7 +92,7 @@ def test_an_unsupported_bare_arm_falls(serve):
     assert np.abs(np.subtract(found, held)).max() > 0.02
 
 
-def test_a_bare_arm_stands_at_home_until_it_is_activated(serve):
+def test_a_bare_arm_rests_at_home_until_it_is_activated(serve):
     arm = serve()
     arm.client.start()
     arm.client.run(cycles=100)

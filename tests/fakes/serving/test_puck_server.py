@@ -20,7 +20,7 @@ MS = 1_000_000
 
 
 class Hosts:
-    """A port whose frames are put in by hand."""
+    """A port with scripted frames."""
 
     name = "hosts"
 
@@ -88,7 +88,7 @@ def test_replies_leave_sequentially_as_on_a_wire(hosts, clock):
         server.step()
         left += [clock.t_ns - begin_ns] * (len(hosts.gone) - len(left))
     # Latched after 75 us; a position has 76 bits, a force 101, and a bit takes 1 us.
-    # Frames leave with their first bit: the way to a host takes as long as the rest.
+    # Frames leave with their first bit: the path to a host takes as long as the others.
     assert left == [1000 * (75 + 76 * n) for n in range(8)] + [1000 * (75 + 532 + 101)]
     assert [can_id for can_id, _ in hosts.gone] == [
         *(0x403 + 0x20 * n for n in range(1, 8)),
@@ -114,7 +114,7 @@ def test_every_frame_of_the_bus_is_tapped(hosts, clock):
     assert heard == [1, 0x426]
 
 
-def test_a_silent_host_loses_an_active_arm(hosts, clock):
+def test_an_active_arm_without_requests_is_idled(hosts, clock):
     server, _ = serve(hosts, clock)
     server.press("activate")
     let_pass(server, clock, 120 * MS)  # the heartbeat's limit is 100 ms
@@ -144,7 +144,7 @@ def test_uncarried_frames_are_reported(hosts, clock):
 
 
 def carried_arm():
-    """Return an arm that a person carries wherever it is."""
+    """Return an arm that a person supports in any pose."""
     options = PlantOptions(support=Support.PERSON)
     arm = ArmPlant(CONSTANTS, TOOL, FRAME, START_Q, options)
     arm.short_windings([False] * 7)
@@ -181,7 +181,7 @@ def test_the_served_arm_starts_in_the_requested_pose(
     assert sorted(hosts.gone) == (asleep if is_idle_first else []) + not_zeroed
 
 
-def test_the_served_arm_stands_at_home(hosts, clock):
+def test_the_served_arm_is_at_home(hosts, clock):
     server = build_home_server(hosts, HomePose(TOOL, FRAME, None, True), clock)
     hosts.coming += [(node, b"\x85\0\x02\0\0\0") for node in range(1, 8)]
     let_pass(server, clock, 800 * MS)  # longer than a puck takes to boot

@@ -1,4 +1,4 @@
-"""Hands at a served arm, and what is true of it, as its client sees them."""
+"""The client of a served arm sees the effect of hands and of wrong rigs."""
 
 import numpy as np
 import pytest
@@ -47,7 +47,7 @@ def test_hands_pose_the_arm_as_read_by_its_client(serve):
 def test_a_joint_ends_at_its_stop(serve):
     arm = serve(has_hand=True, is_at_rest=True)
     order(arm, "stop 6 high", 1.0)
-    # It was zeroed at rest, which its client takes for home.
+    # The arm was zeroed at rest, which its client takes for home.
     assert arm.server.hands.is_hand_done
     assert arm.client.read_joints()[5] == pytest.approx(HOME_Q[5], abs=0.01)
     order(arm, "pose 0 -2 0 3.13 0 0 0 1", 1.4)

@@ -1,4 +1,4 @@
-"""A host that forgives nothing finds nothing to forgive, and would if there were."""
+"""A strict host accepts the simulated network and detects every deviation."""
 
 from collections import deque
 from contextlib import closing
@@ -43,9 +43,9 @@ def test_a_strict_host_drives_the_arm(kind, vers, has_sensor, tmp_path):
 
 
 class LyingBus:
-    """Passes frames on, after `lie(frame)` has made none, one or more of each.
+    """Passes on the frames, none or several, that `lie` makes of each frame.
 
-    What `held` holds comes with the frames after the next question.
+    Frames in `held` arrive with those after the next request.
     """
 
     def __init__(self, bus, lie):
@@ -72,28 +72,28 @@ def frame_of(can_id, data):
 
 
 def changed(can_id, change, at=None):
-    """Let what `can_id` says become `change(data)`, where it begins with `at`."""
+    """Return a lie that changes frames of `can_id` that begin with `at`."""
 
     def lie(_bus, frame, is_of_host):
         if is_of_host:
             return []
         data = bytes(frame.data)
         if frame.arbitration_id == can_id and data[:1] == (at or data[:1]):
-            return [frame_of(can_id, each.hex()) for each in change(data)]
+            return [frame_of(can_id, reply.hex()) for reply in change(data)]
         return [frame]
 
     return lie
 
 
 def set_answered(_bus, frame, is_of_host):
-    """Let puck 3 acknowledge a SET."""
+    """Let puck 3 reply to a SET."""
     if is_of_host and frame.arbitration_id == 3 and len(frame.data) == 6:
         return [frame_of(0x466, "85 00 02 00")]
     return [] if is_of_host else [frame]
 
 
 def late(can_id):
-    """Let what `can_id` says come after its millisecond."""
+    """Return a lie that delays frames of `can_id` beyond a millisecond."""
 
     def lie(bus, frame, is_of_host):
         if not is_of_host and frame.arbitration_id == can_id:
@@ -105,7 +105,7 @@ def late(can_id):
 
 
 def unasked(_bus, frame, is_of_host):
-    """Let puck 5 speak when the arm is told something."""
+    """Let puck 5 send an unsolicited reply when torques are sent."""
     if is_of_host and frame.arbitration_id == 0x401:
         return [frame_of(0x4A6, "89 00 23 00")]
     return [] if is_of_host else [frame]
@@ -113,9 +113,9 @@ def unasked(_bus, frame, is_of_host):
 
 def bit_flipped(index, mask):
     def change(data):
-        spoilt = bytearray(data)
-        spoilt[index] ^= mask
-        return [bytes(spoilt)]
+        damaged = bytearray(data)
+        damaged[index] ^= mask
+        return [bytes(damaged)]
 
     return change
 

@@ -1,4 +1,4 @@
-"""An active simulated arm in the loop, whose true joint state the tests look at."""
+"""An active simulated arm in the loop, with its true joint state."""
 
 from dataclasses import replace
 from weakref import finalize
@@ -45,7 +45,7 @@ class NoFoot:
 
 
 def heavier(kg):
-    """Return the model of an arm whose foot weighs so much more than the real one."""
+    """Return the model of an arm whose foot is `kg` heavier than the real one."""
     foot = TOOL.foot
     return ArmModel(
         CONSTANTS, replace(TOOL, foot=Body(foot.mass + kg, foot.com, foot.inertia))
@@ -53,12 +53,12 @@ def heavier(kg):
 
 
 class HoldBench:
-    """An arm without a hand on it, in hold.
+    """An arm in hold without a hand on it.
 
     `error`: by how much rig.toml makes the foot too heavy [kg]. `compensation`: of
     friction, in the law. `motors`: friction of the motors, given instead of drawn.
     `late`: cycles by which torques arrive late. `cables`: their resonance [Hz], None =
-    stiff. `mass`: virtual, in float [kg]. `sent`: the torques beside gravity's
+    stiff. `mass`: virtual, in float [kg]. `sent`: the torques without gravity's
     [N m], cycle by cycle.
     """
 
@@ -136,7 +136,7 @@ class HoldBench:
             self.step()
 
     def push(self, joint, torque, seconds):
-        """Let somebody push a joint so hard [N m]; return the true positions."""
+        """Push a joint with `torque` [N m]; return the true positions."""
         self.plant.disturbance[joint] = torque
         q = self.run(seconds)
         self.plant.disturbance[joint] = 0.0

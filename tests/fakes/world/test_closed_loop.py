@@ -1,4 +1,4 @@
-"""Driver, control law and plant through the wire only, judged on the truth."""
+"""Driver, control law and plant, joined by the bus only, judged by the truth."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ POSES = [
 
 
 class ClosedLoop:
-    """An arm that a control law moves through the simulated bus, nobody touching it."""
+    """An arm that a control law moves through the simulated bus, without a hand."""
 
     def __init__(self, tool, q, friction=0.05, virtual_mass=0.0):
         self.clock = SteppedClock()

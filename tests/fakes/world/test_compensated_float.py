@@ -18,7 +18,7 @@ KICK = 0.3  # rad/s
 
 
 def over(motors, factor):
-    """Return a compensation that takes the friction for so much larger."""
+    """Return a compensation of `factor` times the friction."""
     level = factor * motors.coulomb
     return FrictionLowerBound(level, level, NOTHING, NOTHING, NOTHING)
 
@@ -26,7 +26,7 @@ def over(motors, factor):
 def settled(motors, known, share=0.8, *, late=0, joint=1, grip="none", cables=None):
     """Kick a joint of a floating arm; return its positions in the sixth second.
 
-    `grip`: "stiff" of a hand that carries, "loose" of one that lies on the arm.
+    `grip`: "stiff" for a hand that carries, "loose" for a hand that lies on the arm.
     """
     compensation = FrictionCompensation(CONSTANTS, known, share)
     bench = HoldBench(

@@ -1,4 +1,4 @@
-"""One false position, through driver, guard, law and plant: it must not be a blow."""
+"""A single false position does not jerk the arm, from driver to plant."""
 
 import numpy as np
 import pytest
@@ -41,7 +41,7 @@ class NoFoot:
 
 
 class Bench:
-    """An active arm whose pucks can be made to lie once."""
+    """An active arm of which one puck can report a false position once."""
 
     def __init__(self, state):
         self.rig, self.clock = make_rig()
@@ -77,14 +77,14 @@ class Bench:
             return frames
         motor, counts = self.lie
         wanted = position_reply_id(motor)
-        told = []
+        received = []
         for frame in frames:
             if frame.can_id == wanted and self.lie is not None:
                 self.lie = None
                 data = encode_position(decode_position(frame.data) + counts)
                 frame = frame._replace(data=data)  # noqa: PLW2901
-            told.append(frame)
-        return told
+            received.append(frame)
+        return received
 
     def run(self, cycles):
         for _ in range(cycles):
@@ -93,7 +93,7 @@ class Bench:
 
 
 def plausible(motor):
-    """Return how far a motor may seem to move in one cycle [counts]."""
+    """Return the largest plausible step of a motor in one cycle [counts]."""
     per_rad = 4096 / (2 * np.pi)
     fastest = np.abs(CONSTANTS.j2mp[motor - 1]) @ np.array(SETTINGS.speed_limits)
     return SETTINGS.jump_margin * fastest * per_rad * PERIOD

@@ -1,4 +1,4 @@
-"""A loop of which every cycle is late, on the true simulated arm."""
+"""The simulated arm stays safe when every cycle of the loop is late."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from acquisition.control_loop.states import ArmState
 from tests.fakes.world.holding import SPEED, HoldBench
 
 MS = 1_000_000
-TOLD_MS = 250.0  # of lateness that lasts, until the arm is idle
+LIMIT_MS = 250.0  # of lasting lateness until the arm is idle
 
 
 class LateClock:
@@ -53,7 +53,7 @@ def test_lasting_lateness_idles_the_arm_while_slow(friction, state, late_ms):
     assert worst <= 1.0
     assert Fault.LOOP_LOST in faults
     assert idle_ms is not None
-    assert idle_ms <= TOLD_MS
+    assert idle_ms <= LIMIT_MS
 
 
 @pytest.mark.slow

@@ -66,8 +66,8 @@ def drive(seed):
 
 def test_the_same_seed_gives_the_same_rig_and_another_does_not():
     assert drive(1) == drive(1)
-    one, two = drive(1), drive(2)
-    assert all(a != b for a, b in zip(one[::2], two[::2], strict=True))
+    first, second = drive(1), drive(2)
+    assert all(a != b for a, b in zip(first[::2], second[::2], strict=True))
 
 
 def test_every_trial_has_its_own_reproducible_ground(rig_and_clock):
@@ -85,7 +85,7 @@ def test_every_trial_has_its_own_reproducible_ground(rig_and_clock):
 
 
 def pushed(trials, pace=None):
-    """Push in `trials` one after the other; return the truth of the last."""
+    """Push in each of `trials` in turn; return the truth of the last one."""
     rig, clock = make_rig()
     hand = LocalSimulation(rig, pace)
     for trial in trials:
@@ -120,7 +120,7 @@ def test_no_step_of_a_session_lets_the_sensor_jump():
 
 
 def smooth_error(rig, clock):
-    """Let 0.1 s pass and return the mean of what the sensor adds to no force."""
+    """Let 0.1 s pass and return the mean reading of the sensor without force."""
     start = clock.now_ns()
     shown = []
     for k in range(80):
@@ -155,16 +155,16 @@ def test_a_silent_sensor_sends_nothing_until_repaired(rig_and_clock, fault):
     port = rig.open_port()
     hand = LocalSimulation(rig)
 
-    def said():
+    def received():
         clock.sleep_until(clock.now_ns() + S // 20)
         return port.read(65536)
 
-    assert said()
+    assert received()
     hand.inject(fault)
-    said()  # what was on the wire already
-    assert said() == b""
+    received()  # bytes already on the wire
+    assert received() == b""
     hand.clear_faults()
-    assert said()
+    assert received()
 
 
 @pytest.fixture
@@ -191,11 +191,11 @@ def test_a_sensor_on_the_bus_reads_the_plants_load(rig_with_sensor_on_bus):
     # 0.2 s of the sensor's errors: drift 0.24 N and 0.011 N m, at 4 sigma.
     assert felt[:3] == pytest.approx(true[:3], abs=1.0)
     assert felt[3:] == pytest.approx(true[3:], abs=0.06)
-    assert abs(true[2]) > 3.0  # the foot hangs on it
+    assert abs(true[2]) > 3.0  # the foot hangs on the sensor
 
 
 @pytest.mark.parametrize("fault", ["ft-silent", "ft-stale"])
-def test_a_sensor_on_the_bus_falls_silent_too(rig_with_sensor_on_bus, fault):
+def test_a_sensor_on_the_bus_can_fall_silent(rig_with_sensor_on_bus, fault):
     rig, clock = rig_with_sensor_on_bus
     hand = LocalSimulation(rig)
     hand.inject(fault)
@@ -210,7 +210,7 @@ def test_every_known_fault_can_be_injected(rig_and_clock):
     assert hand.fault_names
     for fault in hand.fault_names:
         hand.inject(fault)
-    assert rig.network.safety_mode is SafetyMode.E_STOP  # the last one stays
+    assert rig.network.safety_mode is SafetyMode.E_STOP  # the last fault persists
 
 
 def test_true_forces_are_in_the_base_frame(rig_and_clock):

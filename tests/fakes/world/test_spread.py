@@ -1,4 +1,4 @@
-"""Sound rigs as they differ from each other."""
+"""Sound rigs differ from each other in their stated properties."""
 
 from dataclasses import replace
 
@@ -30,7 +30,7 @@ DRAWN = [draw_sound_rig(seed) for seed in range(RIGS)]
 
 
 def spread_of(values):
-    """Return the standard deviation over many rigs, of what has mean 0."""
+    """Return the standard deviation of a zero-mean quantity over many rigs."""
     return float(np.sqrt(np.mean(np.square(values))))
 
 
@@ -122,9 +122,9 @@ def test_zeros_offset_positions_and_stops_have_their_own_offset():
 
 
 def test_the_truth_of_a_rig_is_consistent():
-    one = RigDeviation(zeros=np.full(7, 0.1), foot_mass=1.1, friction=2.0)
+    first = RigDeviation(zeros=np.full(7, 0.1), foot_mass=1.1, friction=2.0)
     other = RigDeviation(zeros=np.full(7, 0.2), foot_mass=0.5, torn=2)
-    both = other.on(one)
+    both = other.on(first)
     assert both.zeros == pytest.approx(np.full(7, 0.3))
     assert (both.foot_mass, both.friction, both.torn) == (0.55, 2.0, 2)
 
@@ -132,7 +132,7 @@ def test_the_truth_of_a_rig_is_consistent():
 def test_a_base_turned_about_y_changes_the_gravity_direction():
     turned = RigDeviation(mount=np.radians([0.0, 90.0, 0.0]))
     down = true_options(PlantOptions(), turned).down
-    # Its z axis lies along the true x: what is down is its own -z turned back.
+    # The z axis of the base lies along the true x: down is its own -z turned back.
     assert down == pytest.approx((1.0, 0.0, 0.0), abs=1e-12)
 
 

@@ -1,4 +1,4 @@
-"""Hold means standing still: the true joints of the simulated arm in the loop."""
+"""The true joints of the simulated arm stay at rest in hold."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ pytestmark = pytest.mark.slow
 FRICTION = (0.02, 1.0)
 DRIFT = 0.02  # rad
 STILL = 5e-4  # rad in a second: wrist joints go on creeping by encoder counts
-# What the spring gives back when a person lets go: limit / k; and some swing.
+# The spring's return when a person lets go, limit / k, and some swing.
 REACH = np.array([0.018, 0.010, 0.020, 0.024, 0.040, 0.040, 0.065])
 # Share of the speed limit; joints 1 and 2 move the whole arm: no push does it faster.
 FAST = (0.65, 0.6, 0.9, 0.9, 0.9, 0.9)
@@ -47,7 +47,7 @@ def test_an_arm_that_is_pushed_away_stays_where_it_is_left(friction, joint):
     dry = friction * CONSTANTS.coulomb[joint]
     pushed = bench.push(joint, 1.15 * TORQUE_LIMIT[joint] + dry, 1.5)[:, joint]
     left = bench.run(2.0)[:, joint]
-    assert pushed[-1] - bench.braked_q[joint] > 2.0 * REACH[joint]  # it gave way
+    assert pushed[-1] - bench.braked_q[joint] > 2.0 * REACH[joint]  # the arm gave way
     assert pushed[-1] - left.min() < 0.7 * REACH[joint]
     assert np.ptp(left[-500:]) < 0.2 * REACH[joint]  # simulated dry friction creeps
     assert bench.cycle.status.verdict is None
@@ -58,8 +58,8 @@ def test_a_slow_push_meets_at_most_the_limit(joint):
     bench = HoldBench()
     bench.sent.clear()
     bench.push(joint, 1.15 * TORQUE_LIMIT[joint], 1.0)
-    most = np.abs(bench.sent).max(axis=0)[joint]
-    assert 0.8 * TORQUE_LIMIT[joint] < most < 1.6 * TORQUE_LIMIT[joint]
+    largest = np.abs(bench.sent).max(axis=0)[joint]
+    assert 0.8 * TORQUE_LIMIT[joint] < largest < 1.6 * TORQUE_LIMIT[joint]
 
 
 def test_a_foot_that_is_twisted_far_stays_where_it_is_left():

@@ -1,4 +1,4 @@
-"""Whatever the guard finds stops an arm that moves by itself: its true joints."""
+"""Every fault of the guard stops the true joints of an arm that moves by itself."""
 
 from dataclasses import replace
 
@@ -15,10 +15,10 @@ from wam.bus.frames import position_reply_id
 pytestmark = pytest.mark.slow
 
 SPEED = 0.5  # rad/s, the fastest a move is
-WAY = np.array([0.6, -0.45, 0.3, 0.6, 0.45, -0.6, 0.3])  # rad
+OFFSETS = np.array([0.6, -0.45, 0.3, 0.6, 0.45, -0.6, 0.3])  # rad
 MIDDLE = 1.0  # s after the start; the arm moves at full speed
 STOP = 0.75  # s within which it stands, the last swing included
-# 0.5 rad/s for as long as the guard takes to see it, and the way to a stop [rad].
+# 0.5 rad/s until the guard detects the fault, and the stopping distance [rad].
 TRAVEL = 0.08
 STILL = 3e-3  # rad in half a second
 # Idle, it sinks on its windings; until then it may have lost a motor [rad/s].
@@ -26,8 +26,8 @@ SINKING, FALLING = 0.8, 3.0
 
 
 def move(bench):
-    """Send the arm off and return it in the middle of its way."""
-    goal = bench.plant.q + WAY
+    """Start a move, let it reach the middle and return its goal."""
+    goal = bench.plant.q + OFFSETS
     bench.cycle.move_to(goal.tolist(), SPEED)
     bench.run(MIDDLE)
     assert np.abs(bench.plant.qd).max() > 0.8 * SPEED
@@ -35,7 +35,7 @@ def move(bench):
 
 
 def check_stopped(bench, begin, *, travel=TRAVEL):
-    """Hold the arm against `begin`, where it was when something went wrong."""
+    """Check that the arm stops within `travel` of `begin`, its pose at the fault."""
     seen, speeds = [], []
     for _ in range(round((STOP + 0.5) * RATE)):
         seen.append(bench.step())
@@ -57,7 +57,7 @@ def tighten(**limits):
 
 
 def too_weak(bench):
-    """Let the weight be too much in one cycle; with less for long the arm falls."""
+    """Lower a torque limit below the weight for one cycle; the arm would fall."""
     bench.cycle.limits = replace(LIMITS, torque=(20.0, 0.5, 15.0, 15.0, 2.5, 2.5, 1.3))
     bench.step()
     bench.cycle.limits = LIMITS
@@ -113,12 +113,12 @@ def test_a_fault_of_motion_or_cadence_stops_a_move(name):
 
 
 @pytest.mark.parametrize("name", BRAKED)
-def test_a_fault_that_takes_the_arm_away_stops_a_move(name):
+def test_a_fault_that_brakes_the_arm_stops_a_move(name):
     bench = HoldBench()
     move(bench)
     begin = bench.plant.q.copy()
     inject(name)(bench)
-    # 0.4 s until a silent safety module is a silent one; holding since 0.25 s.
+    # 0.4 s until a silent safety module counts as silent; holding since 0.25 s.
     check_stopped(bench, begin, travel=0.2 if name == "safety-silent" else TRAVEL)
     assert bench.plant.is_idle or bench.cycle.status.state is ArmState.HOLD
 
@@ -155,7 +155,7 @@ def test_a_stopped_move_does_not_resume_after_the_fault():
     assert np.abs(q[-1] - goal).max() > 0.1
 
 
-def test_no_move_begins_while_a_verdict_stands():
+def test_no_move_begins_while_a_verdict_is_active():
     bench = HoldBench()
     goal = move(bench)
     report(Fault.CONSOLE_SILENT)(bench)
@@ -171,7 +171,7 @@ def test_no_move_begins_while_a_verdict_stands():
 
 def test_a_pending_move_is_discarded_by_a_hold_request():
     bench = HoldBench()
-    bench.cycle.move_to((bench.plant.q + WAY).tolist(), SPEED)
+    bench.cycle.move_to((bench.plant.q + OFFSETS).tolist(), SPEED)
     bench.cycle.request(ArmState.HOLD)
     assert np.ptp(bench.run(0.5), axis=0).max() < STILL
 
@@ -179,7 +179,7 @@ def test_a_pending_move_is_discarded_by_a_hold_request():
 def test_stopping_a_move_at_rest_causes_no_torque_step():
     bench = HoldBench(error=0.6)
     bench.cycle.move_to((bench.plant.q + 0.02).tolist(), 0.1)
-    bench.run(1.5)  # there, and held against a wrong weight
+    bench.run(1.5)  # at the goal, and held against a wrong weight
     bench.sent.clear()
     bench.run(0.01)
     bench.enter(ArmState.HOLD)
@@ -188,7 +188,7 @@ def test_stopping_a_move_at_rest_causes_no_torque_step():
 
 
 def freeze(bench, motor):
-    """Let a motor go on telling the place it is at now."""
+    """Freeze the reported position of a motor."""
     here = bench.plant.counts()[motor - 1]
     bench.rig.network.faults.falsify(position_reply_id(motor), lambda _: here)
 
@@ -202,7 +202,7 @@ def worst_speed(bench, seconds):
     return max(shares)
 
 
-# What surely moves a joint makes one without friction faster than one with it.
+# A torque that moves every joint is fastest on a joint without friction.
 FASTEST = {0.02: 1.75, 0.3: 1.25, 1.0: 1.0}
 FROZEN = [
     pytest.param(
@@ -227,7 +227,7 @@ def test_an_encoder_that_freezes_in_a_move_is_detected(friction, motor):
 def test_an_encoder_frozen_before_a_move_is_detected(friction, motor):
     bench = HoldBench(friction=friction)
     freeze(bench, motor)
-    bench.cycle.move_to((bench.plant.q + WAY).tolist(), SPEED)
+    bench.cycle.move_to((bench.plant.q + OFFSETS).tolist(), SPEED)
     assert worst_speed(bench, 2.0) < FASTEST[friction]
     assert bench.cycle.status.verdict.fault is Fault.MOTOR_STUCK
 
@@ -237,15 +237,20 @@ def test_an_encoder_frozen_before_a_move_is_detected(friction, motor):
 def test_a_sound_arm_completes_moves_with_any_friction_and_weight(friction, error):
     bench = HoldBench(friction=friction, error=error)
     begin = bench.plant.q.copy()
-    for goal, speed in ((WAY, 0.5), (0.0 * WAY, 0.05), (0.1 * WAY, 0.05), (0.0, 0.5)):
+    for goal, speed in (
+        (OFFSETS, 0.5),
+        (0.0 * OFFSETS, 0.05),
+        (0.1 * OFFSETS, 0.05),
+        (0.0, 0.5),
+    ):
         bench.cycle.move_to((begin + goal).tolist(), speed)
-        bench.run(np.abs(WAY).max() / speed + 1.5 if speed > 0.1 else 3.0)
+        bench.run(np.abs(OFFSETS).max() / speed + 1.5 if speed > 0.1 else 3.0)
         assert bench.cycle.status.verdict is None
 
 
 def test_joint_7_frozen_at_its_top_speed_is_braked():
     bench = HoldBench()
-    bench.cycle.move_to((bench.plant.q + WAY).tolist(), SPEED)
+    bench.cycle.move_to((bench.plant.q + OFFSETS).tolist(), SPEED)
     bench.run(0.8)
     assert bench.plant.qd[6] == pytest.approx(SPEED, rel=0.1)
     freeze(bench, 7)
@@ -254,7 +259,7 @@ def test_joint_7_frozen_at_its_top_speed_is_braked():
 
 
 def test_holding_the_arm_in_a_move_brakes_it():
-    """What does not turn is not told from what is held."""
+    """A held motor cannot be distinguished from a stuck one."""
     bench = HoldBench()
     move(bench)
     q = bench.plant.q.copy()

@@ -1,4 +1,4 @@
-"""Each wrong rig of the catalogue differs from the sound one in the way it is named."""
+"""Each wrong rig of the catalogue differs from the sound one as its name states."""
 
 from dataclasses import replace
 
@@ -37,7 +37,7 @@ LOAD = np.array([1.0, 2.0, -4.0, 0.1, -0.2, 0.05])
 
 @pytest.fixture
 def build():
-    """Return a function that builds the rig of a name, not spread."""
+    """Return a function that builds the rig of a name without its spread."""
     built = []
 
     def start(name):
@@ -55,7 +55,7 @@ def build():
 
 
 def say(rig, can_id, data, wait_ns=MS):
-    """Send a frame to the network; return (time, id, data) of what comes back."""
+    """Send a frame to the network; return (time, id, data) of the replies."""
     network = rig.network
     now_ns = network.schedule.now_ns
     network.receive(now_ns, can_id, data)
@@ -66,7 +66,7 @@ def say(rig, can_id, data, wait_ns=MS):
 
 
 def get(rig, node, name, device=Device.MOTOR):
-    """Return what a node answers when it is asked, a list."""
+    """Return the list of a node's replies to a request."""
     data = encode_get(property_number(device, name, 200))
     return [
         decode_reply(data).value
@@ -76,7 +76,7 @@ def get(rig, node, name, device=Device.MOTOR):
 
 
 def ask(rig, wait_ns=MS):
-    """Ask for positions; return (time, node, counts) of the replies."""
+    """Request positions; return (time, node, counts) of the replies."""
     nodes = {position_reply_id(node): node for node in MOTOR_NODES}
     return [
         (t_ns, nodes[reply], decode_position(data))
@@ -86,7 +86,7 @@ def ask(rig, wait_ns=MS):
 
 
 def believed(plant: ArmPlant):
-    """Return the joint positions that a program takes the arm to have [rad]."""
+    """Return the joint positions that a program computes from the counts [rad]."""
     return np.linalg.solve(CONSTANTS.j2mp, TURNS * np.array(plant.counts()))
 
 
@@ -109,14 +109,14 @@ def test_the_sound_rig_has_no_deviation(build):
     assert believed(plant) == pytest.approx(NEAR_HOME, abs=2e-4)
 
 
-SAID = [
-    (rig.name, *said)
+REPORTED = [
+    (rig.name, *value)
     for rig in catalogue().values()
-    for said in rig.departure.properties
+    for value in rig.departure.properties
 ]
 
 
-@pytest.mark.parametrize(("name", "node", "prop", "value"), SAID)
+@pytest.mark.parametrize(("name", "node", "prop", "value"), REPORTED)
 def test_wrong_pucks_report_the_named_deviation(build, name, node, prop, value):
     assert get(build(name), node, prop) == [value]
     assert get(build(""), node, prop) != [value]
@@ -156,10 +156,10 @@ def test_a_reversed_encoder_counts_backwards(build):
     plant.q = CONSTANTS.home
     home = np.array(plant.counts())
     plant.q = NEAR_HOME
-    told = np.array(plant.counts()) - home
+    reported = np.array(plant.counts()) - home
     true = CONSTANTS.j2mp @ (NEAR_HOME - CONSTANTS.home) / TURNS
     signs = np.array([-1.0 if n == 4 else 1.0 for n in MOTOR_NODES])
-    assert told == pytest.approx(signs * true, abs=2.0)
+    assert reported == pytest.approx(signs * true, abs=2.0)
 
 
 def test_swapped_encoders_report_each_others_motor(build):
@@ -167,10 +167,10 @@ def test_swapped_encoders_report_each_others_motor(build):
     plant.q = CONSTANTS.home
     home = np.array(plant.counts())
     plant.q = NEAR_HOME
-    told = (np.array(plant.counts()) - home).tolist()
+    reported = (np.array(plant.counts()) - home).tolist()
     true = (CONSTANTS.j2mp @ (NEAR_HOME - CONSTANTS.home) / TURNS).tolist()
     true[5], true[6] = true[6], true[5]
-    assert told == pytest.approx(true, abs=2.0)
+    assert reported == pytest.approx(true, abs=2.0)
 
 
 def test_a_rotor_on_a_torn_cable_reports_no_motion(build):
@@ -194,9 +194,9 @@ def test_travel_from_home_is_scaled(build):
     plant.q = CONSTANTS.home
     assert believed(plant) == pytest.approx(CONSTANTS.home, abs=2e-4)
     plant.q = NEAR_HOME
-    told = (believed(plant) - CONSTANTS.home) / (NEAR_HOME - CONSTANTS.home)
+    reported = (believed(plant) - CONSTANTS.home) / (NEAR_HOME - CONSTANTS.home)
     shares = [1.0] * 4 + [9.48 / 9.7] * 2 + [1.0]
-    assert told == pytest.approx(shares, abs=3e-3)
+    assert reported == pytest.approx(shares, abs=3e-3)
 
 
 @pytest.mark.parametrize(
@@ -297,8 +297,8 @@ def test_one_position_in_a_thousand_is_lost(build):
 
 def test_a_duplicated_node_answers_twice(build):
     rig = build("duplicate-node")
-    one, other = get(rig, 5, "SN")
-    assert one != other
+    first, second = get(rig, 5, "SN")
+    assert first != second
     assert [node for _, node, _ in ask(rig)].count(5) == 2
     assert [node for _, node, _ in ask(rig)].count(4) == 1
 
@@ -314,9 +314,9 @@ def test_another_program_is_on_the_bus(build):
 
 def test_a_dead_button_has_no_effect(build):
     rig, sound = build("stop-button-dead"), build("")
-    for each in (rig, sound):
-        each.network.pendant("activate")
-        each.network.pendant("estop")
+    for arm in (rig, sound):
+        arm.network.pendant("activate")
+        arm.network.pendant("estop")
     assert rig.network.safety_mode is SafetyMode.ACTIVE
     assert sound.network.safety_mode is not SafetyMode.ACTIVE
 
@@ -353,7 +353,7 @@ def test_a_wrong_module_sets_another_limit(build):
     assert read == [2000, 1000]
 
 
-def test_wrong_places_have_the_named_deviation():
+def test_wrong_containers_have_the_named_deviation():
     def frame(name):
         return true_frame(replace(FRAME, incline=0.2), wrong_rig(name).departure)
 
