@@ -1,8 +1,8 @@
 """Measured bounds of every fault: `python -m tests.faults.bounds [PART OF A NAME]`.
 
-Where the arm is driven by a person's push and where it moves by itself. They lie in
-bounds.json beside this module, so that tables are printed without a run; the
-matrix holds its cells against them. A run takes about ten minutes.
+They apply to a trial with a person's push and to a move by the arm itself. They are
+stored in bounds.json beside this module, so that tables are printed without a run; the
+matrix checks its cells against them. A run takes about ten minutes.
 """
 
 import json
@@ -23,13 +23,13 @@ from tests.faults.truth import Promise, TrueMotion
 COLUMNS = (*PHASES, MOVING)
 BOUND_PHASES = ("recording", MOVING)
 PATH = Path(__file__).with_name("bounds.json")
-# Machines round differently, and what the arm does before a fault may change a little.
+# Machines round differently, and the motion before a fault may change a little.
 _SHARE, _SLACK = 1.25, (0.05, 0.005, 3.0, 10.0)
 
 
 @dataclass(frozen=True, slots=True)
 class PrintedBound:
-    """What was measured in a cell, rounded up; fields as of `TrueMotion`."""
+    """The measured values of a cell, rounded up; fields as in `TrueMotion`."""
 
     speed: float
     joint: int
@@ -41,14 +41,14 @@ class PrintedBound:
     rest_ms: float | None
 
     def with_margin(self) -> Promise:
-        """Return what a run on another machine has to stay within."""
+        """Return the bounds of a run on another machine."""
         values = (self.speed, self.travel, self.drive, self.hand)
         pairs = zip(values, _SLACK, strict=True)
         return Promise(*(_SHARE * value + slack for value, slack in pairs))
 
 
 def cells_of_all() -> list[tuple[str, str, Cell]]:
-    """Return (fault, phase, what has to come of it), the arm's own moves included."""
+    """Return (fault, phase, outcome) of every cell, the arm's own moves included."""
     moving = [
         (fault, MOVING, cell)
         for fault, cell in MOVING_CELLS.items()
@@ -86,7 +86,7 @@ def _up(value: float, step: float) -> float:
 
 
 def main(part: str) -> None:
-    """Measure the cells whose name contains `part` and write what came out."""
+    """Measure the cells whose name contains `part` and write the results."""
     rows = {
         f: {p: list(astuple(b)) for p, b in r.items()} for f, r in read_bounds().items()
     }

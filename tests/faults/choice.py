@@ -1,4 +1,4 @@
-"""Hold, damp or idle: why each fault has its reaction, and how far the sole goes.
+"""Hold, damp or idle: the reason for each reaction and the travel of the sole.
 
 An idle arm sinks. Where positions and torques can be trusted, holding or damping with
 the weight compensated is better; where they cannot, it would drive an arm blindly.
@@ -93,10 +93,10 @@ def choice_lines() -> list[str]:
         measured = bounds.get(_ROWS.get(fault, fault.value), {})
         cells = [f"`{fault.value}`", reaction, WHY[fault]]
         for phase in (MOVING, "recording"):
-            cells += [_way(measured.get(phase)), _way(idled[phase])]
+            cells += [_travel(measured.get(phase)), _travel(idled[phase])]
         rows.append(f"| {' | '.join(cells)} |")
     return rows
 
 
-def _way(bound: PrintedBound | None) -> str:
+def _travel(bound: PrintedBound | None) -> str:
     return "-" if bound is None else f"{1e3 * bound.travel:.0f} mm"

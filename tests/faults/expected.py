@@ -1,4 +1,4 @@
-"""What each fault has to come to in each phase, as data."""
+"""The expected outcome of each fault in each phase, as data."""
 
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -18,7 +18,7 @@ class End(Enum):
     COMPLETE = "nothing happens"
     REFUSED = "refused, nothing created"
     NOT_ACTIVATED = "not activated, resumed"
-    TOLD = "reported, the trial goes on or is redone"
+    REPORTED = "reported, the trial goes on or is redone"
     REDONE = "trial interrupted and redone"
     UNTARED = "five tares refused, resumed"
     UNBRACKETED = "kept, the last tare is missing"
@@ -36,14 +36,14 @@ class End(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Arm:
-    """What the arm does, and how long after the fault it may take.
+    """The reaction of the arm and the longest time from the fault to it.
 
     Attributes:
         limit_ms: the limit that the fault reaches; 20 ms are added to it.
         seen: by the pucks: "driven", "last torques", "idle", "without power", or
-            DAMPED_OR_IDLE, in whatever state of the loop.
-        state: of the loop; None = whatever it was.
-        text: what the message says of it.
+            DAMPED_OR_IDLE in any state of the loop.
+        state: of the loop; None = any.
+        text: the words of the message about the arm.
     """
 
     limit_ms: float
@@ -54,16 +54,16 @@ class Arm:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """What has to come of one fault in one phase.
+    """The expected outcome of one fault in one phase.
 
     Attributes:
         end: how the command ends.
-        text: what the message contains; for WAITS what is said to the operator.
-        rejected: reasons of the attempts that were put away.
-        arm: what the arm does at once; None = what it did before.
-        at_rest: what it does in the end.
-        why: why the cell cannot exist, or what is particular about it.
-        then: words of a second message, where one fault brings another.
+        text: words of the message.
+        rejected: reasons of the rejected attempts.
+        arm: its immediate reaction; None = no reaction.
+        at_rest: the final state of the arm by its pucks.
+        why: the reason that the cell cannot exist, or a remark on it.
+        then: words of a second message, where one fault causes another.
     """
 
     end: End
@@ -87,7 +87,7 @@ AT_REVIEW = ("session ended at the review",)
 
 
 def _row(cell: Cell, **others: Cell) -> Row:
-    """Return a row with `cell` everywhere but in the phases that are named."""
+    """Return a row with `cell` in every phase but those of `others`."""
     assert set(others) <= set(PHASES)
     return tuple(others.get(phase, cell) for phase in PHASES)
 
@@ -97,7 +97,7 @@ def _refused(text: str) -> Cell:
 
 
 def _ending(text: str, arm: Arm, why: str, **others: Cell) -> Row:
-    """Return the row of a fault that takes the arm away and ends the session."""
+    """Return the row of a fault that stops the arm and ends the session."""
     ended = Cell(End.ENDED, text, arm=arm)
     ended = replace(ended, at_rest=arm.seen if arm.seen == NO_POWER else "idle")
     phases = {
@@ -133,17 +133,17 @@ _IN_STOP = replace(
 
 
 def _module(word: str, idle: Cell) -> Row:
-    """Return the row of a monitor of the safety module that strikes at once."""
+    """Return the row of an immediate fault of a monitor of the safety module."""
     text = f"{_MODULE}{word} fault."
-    told_anew = replace(OK, why="the start-up sends the module its limits again")
-    return _ending(text, _IDLE, "pendant-idle", preflight=told_anew, idle=idle)
+    resent = replace(OK, why="the start-up sends the module its limits again")
+    return _ending(text, _IDLE, "pendant-idle", preflight=resent, idle=idle)
 
 
 def _sensor(limit_ms: float, waits: str, preflight: Cell, **others: Cell) -> Row:
-    """Return the row of a wrist sensor that gives nothing to be trusted."""
+    """Return the row of a wrist sensor without valid readings."""
     held = replace(_HELD, limit_ms=limit_ms)
     redone = Cell(End.REDONE, "T01 stopped at", ("interrupted: ft-stale",), held)
-    waiting = Cell(End.TOLD, waits)
+    waiting = Cell(End.REPORTED, waits)
     phases = {
         "preflight": preflight,
         "ready": replace(redone, arm=None, why="stops as soon as it is recorded"),
@@ -154,7 +154,7 @@ def _sensor(limit_ms: float, waits: str, preflight: Cell, **others: Cell) -> Row
 
 
 def _lost_sensor(waits: str, preflight: Cell) -> Row:
-    """Return the row of a sensor that has to be opened again."""
+    """Return the row of a sensor that must be reopened."""
     untared = Cell(End.UNTARED, waits)
     cut = replace(untared, rejected=("interrupted: ft-stale",))
     kept = Cell(End.UNBRACKETED, waits)
@@ -171,20 +171,20 @@ def _lost_sensor(waits: str, preflight: Cell) -> Row:
 
 def _limit(text: str, why: str, **others: Cell) -> Row:
     """Return the row of a limit of the guard on the arm's motion."""
-    told = Cell(End.TOLD, text, arm=_DAMPED)
+    warned = Cell(End.REPORTED, text, arm=_DAMPED)
     phases = {
         "preflight": NO_LOOP,
         "idle": Cell(End.ENDED, text, why="found when the arm becomes active"),
-        "recording": replace(told, end=End.REDONE, rejected=(f"interrupted: {why}",)),
+        "recording": replace(warned, end=End.REDONE, rejected=(f"interrupted: {why}",)),
         "end": OK,
     }
-    return _row(told, **{**phases, **others})
+    return _row(warned, **{**phases, **others})
 
 
 def _creeping(motor: int) -> Row:
-    """Return the row of an encoder that creeps away: what is seen first stops it.
+    """Return the row of an encoder that drifts until a limit stops the arm.
 
-    Joint 7 turns the foot about its own axis, so only its stop or its lock tell.
+    Joint 7 turns the foot about its own axis, so only its stop or its lock show it.
     """
     arm = Arm(1700 if motor == 7 else 400, DAMPED_OR_IDLE, None, "")
     stopped = Cell(End.SOMEHOW, arm=arm)
@@ -200,7 +200,7 @@ _BEGUN = replace(
 
 
 def _lying(motor: int) -> Row:
-    """Return the row of an encoder that jumps by what the driver believes."""
+    """Return the row of an encoder that jumps by a step that the driver accepts."""
     if motor == 4:  # the arm turns too little about its joint
         return _row(OK)
     stopped = Cell(
@@ -247,7 +247,7 @@ _SLIP_LATER = replace(
     why="watched in trials: stops the next one; let go, the foot swings back",
     then=" rad/s > 4.00",
 )
-# What ends a trial leaves the arm to the console, which asks for hold 20 ms later.
+# After a fault that ends a trial, the console requests hold 20 ms later.
 _BEYOND = Cell(
     End.REDONE,
     "the F/T sensor was beyond its range for ",
@@ -261,7 +261,7 @@ _LOADED = Cell(
     Arm(30, "driven", HOLD, "holding"),
 )
 _PAST = " answered an earlier question: positions are "
-# One cycle in 47 asks for nothing; what is late then is proved within 20 ms.
+# One cycle in 47 requests nothing; late positions are then proved within 20 ms.
 _OLD = Arm(120, "idle", ArmState.IDLE, "UNKNOWN, held with positions of the past")
 _UNPROVED = replace(OK, why="the session ends before a cycle asks for nothing")
 
@@ -277,8 +277,8 @@ def _late() -> Row:
     )
 
 
-def _said_by(name: str, puck: int) -> Row:
-    """Return the row of a puck that says something else of itself from the start."""
+def _wrong_property(name: str, puck: int) -> Row:
+    """Return the row of a puck with a wrong property from the start."""
     later = Cell(End.ABSENT, why="read at every start; later: puck-changed")
     return _row(later, preflight=_refused(f"{name} of puck {puck} is "))
 
@@ -315,15 +315,15 @@ _HEARTBEAT = f"{_MODULE}heartbeat fault."
 
 _EARLY_ANEW = _not_ready("The arm was not activated within 120 s.")
 _DISOBEYS = "does not do as it is told"
-# All pucks are asked for what they hold within 0.12 s.
+# The modes and torques of all pucks are requested within 0.12 s.
 _CAUGHT = replace(_IDLE, limit_ms=130)
 _SET_ANEW = replace(OK, why="the arm's activation sets the mode of every puck")
 
 
 def _disobeying(later: Cell) -> Row:
-    """Return the row of a puck that no longer does what it is told.
+    """Return the row of a puck that no longer obeys.
 
-    `later` is what comes of it where it strikes before the arm is active.
+    `later`: the outcome of a fault before the arm is active.
     """
     why = "puck-disobeys"
     return _ending(_DISOBEYS, _CAUGHT, why, preflight=later, idle=later)
@@ -348,7 +348,7 @@ _MISSED = _ending(
     idle=_NO_TORQUES,
 )
 
-NOTHING = "nothing"  # what the others are measured by
+NOTHING = "nothing"  # the reference of the others
 
 TABLE: dict[str, Row] = {
     NOTHING: _row(OK),
@@ -367,7 +367,7 @@ TABLE: dict[str, Row] = {
     "reply-swapped": _row(OK),
     "reply-spoilt": _row(
         OK,
-        # A false first position is what the true ones are judged by, for a while.
+        # A false first position is the reference of the true ones for a while.
         preflight=_refused(" of 100 exchanges with the arm were incomplete."),
     ),
     "puck-silent": _ending(
@@ -461,11 +461,11 @@ TABLE: dict[str, Row] = {
         end=OK,
     ),
     "puck-changed": _row(_ASKED_IN_TURN, preflight=_refused("IPNM of puck 3 is ")),
-    "wrong-pidx": _said_by("PIDX", 3),
-    "wrong-mt": _said_by("MT", 2),
-    "wrong-grp": _said_by("GRPB", 3),
-    "wrong-ipnm": _said_by("IPNM", 7),
-    "wrong-cts": _said_by("CTS", 4),
+    "wrong-pidx": _wrong_property("PIDX", 3),
+    "wrong-mt": _wrong_property("MT", 2),
+    "wrong-grp": _wrong_property("GRPB", 3),
+    "wrong-ipnm": _wrong_property("IPNM", 7),
+    "wrong-cts": _wrong_property("CTS", 4),
     **{f"dead-motor-{motor}": _row(_DEAD) for motor in range(1, 8)},
     **{
         f"reversed-motor-{motor}": _row(
@@ -541,23 +541,23 @@ TABLE: dict[str, Row] = {
         idle=_NEVER_SEEN_ACTIVE,
     ),
     **{f"lie-of-motor-{motor}": _lying(motor) for motor in range(1, 7)},
-    # The lock pushes joint 7 back to where it was, with nearly all that it may have.
+    # The lock pushes joint 7 back with nearly its largest torque.
     "lie-of-motor-7": _row(
         OK,
         recording=Cell(End.REDONE, _ASKED, ("interrupted: torque-limit",), _DAMPED),
-        review=Cell(End.TOLD, _ASKED, arm=_DAMPED),
+        review=Cell(End.REPORTED, _ASKED, arm=_DAMPED),
     ),
     **{f"stuck-motor-{motor}": _row(UNSEEN) for motor in range(1, 8)},
     **{f"creep-of-motor-{motor}": _creeping(motor) for motor in range(1, 8)},
     "ft-stale": _sensor(20, _FEW, _NO_DATA),
-    "ft-frozen": _sensor(70, _FLAGGED, Cell(End.TOLD, _FLAGGED)),
-    # One number of six: within two spans of 0.25 s, and 20 ms without a valid sample.
+    "ft-frozen": _sensor(70, _FLAGGED, Cell(End.REPORTED, _FLAGGED)),
+    # One channel of six: within two spans of 0.25 s, and 20 ms without a valid sample.
     "ft-stuck": _sensor(
         520,
         _FLAGGED,
-        Cell(End.TOLD, _FLAGGED),
+        Cell(End.REPORTED, _FLAGGED),
         recording=Cell(
-            End.TOLD,
+            End.REPORTED,
             _FLAGGED,
             why="the trial is over before; its review names the channel",
         ),
@@ -566,13 +566,13 @@ TABLE: dict[str, Row] = {
     "ft-saturated": _sensor(
         0,
         _FLAGGED,
-        Cell(End.TOLD, _FLAGGED),
+        Cell(End.REPORTED, _FLAGGED),
         ready=replace(_BEYOND, arm=None, why="stops as soon as it is recorded"),
         recording=_BEYOND,
     ),
     "contact-force": _row(
-        Cell(End.TOLD, "Known-pose residual"),
-        tare=Cell(End.TOLD, "Force varied "),
+        Cell(End.REPORTED, "Known-pose residual"),
+        tare=Cell(End.REPORTED, "Force varied "),
         ready=replace(_LOADED, arm=None, why="stops as soon as it is recorded"),
         recording=_LOADED,
     ),
@@ -581,8 +581,8 @@ TABLE: dict[str, Row] = {
     ),
     "ft-unplugged": _lost_sensor(_FEW, _NO_DATA),
     "ft-jump": _row(
-        Cell(End.TOLD, "Known-pose residual"),
-        tare=Cell(End.TOLD, "Force varied "),
+        Cell(End.REPORTED, "Known-pose residual"),
+        tare=Cell(End.REPORTED, "Force varied "),
     ),
     "ft-reboot": _lost_sensor(_FLAGGED, replace(OK, why="it is set up again")),
     "ft-clock-jump": _lost_sensor(_FLAGGED, replace(OK, why="the fit begins then")),
@@ -608,7 +608,9 @@ TABLE: dict[str, Row] = {
     "foot-speed": _limit(
         "The foot moved at ",
         "foot-speed",
-        idle=Cell(End.TOLD, "The foot moved at ", why="found when the arm is moved"),
+        idle=Cell(
+            End.REPORTED, "The foot moved at ", why="found when the arm is moved"
+        ),
         tare=replace(_WEAK, why="a blow that hold may not allow either"),
     ),
     "overspeed": _limit(
@@ -672,7 +674,7 @@ TABLE: dict[str, Row] = {
 
 
 def cells() -> list[tuple[str, str, Cell]]:
-    """Return (fault, phase, what has to come of it) of every cell that can exist."""
+    """Return (fault, phase, outcome) of every cell that can exist."""
     return [
         (fault, phase, cell)
         for fault, row in TABLE.items()

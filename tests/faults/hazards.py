@@ -1,4 +1,4 @@
-"""What can become dangerous, as data: every signal and every way it can be wrong.
+"""Hazards as data: every signal and every kind of its fault.
 
 `python -m tests.faults` prints it; what is measured comes from bounds.json.
 """
@@ -39,12 +39,12 @@ PROOFS: dict[str, tuple[StepId, ...]] = {
     "friction calibration": (_S.RAMPS,),
     "tool model": (_S.CONFIGURATION, _S.OWN_WEIGHT, _S.LIFT, _S.CONTAINER),
 }
-# What no arm is needed for.
+# Signals that need no arm.
 OF_THE_COMPUTER = {"console heartbeat", "recorder", "disk", "wall clock"}
 
 
 class Mode(Enum):
-    """How a signal is wrong."""
+    """The kind of fault of a signal."""
 
     LOST = "lost"
     STUCK = "stuck"
@@ -58,15 +58,15 @@ class Hazard:
     """A row of the table.
 
     Attributes:
-        signal: whose it is.
-        mode: how it is wrong.
-        hazard: what it may do to person, arm or measurement.
-        cause: what brings it about.
-        detection: what notices it, or "not detected".
-        reaction: what the program does.
+        signal: the faulty signal.
+        mode: the kind of its fault.
+        hazard: the possible effect on person, arm or measurement.
+        cause: possible causes.
+        detection: the means of detection, or "not detected".
+        reaction: the reaction of the program.
         faults: names in the fault matrix that were measured.
-        bound: what bounds it where no fault was measured.
-        tests: nodes that hold it.
+        bound: the bound where no fault was measured.
+        tests: the tests of detection and reaction.
     """
 
     signal: str
@@ -90,7 +90,7 @@ def hazards() -> list[Hazard]:
 
 
 def measured(hazard: Hazard) -> str:
-    """Return the worst that was measured of the faults, or the bound in words."""
+    """Return the worst measured values of the faults, or the bound in words."""
     bounds = [
         bound
         for fault in hazard.faults
@@ -106,7 +106,7 @@ def _worst(bounds: list[PrintedBound]) -> str:
     unusual = [
         bound
         for bound in bounds
-        if not any(is_within(bound, each.with_margin()) for each in usual)
+        if not any(is_within(bound, other.with_margin()) for other in usual)
     ]
     return _largest(unusual) if unusual else f"as without it: {_largest(usual)}"
 
@@ -140,7 +140,7 @@ def hazard_lines() -> list[str]:
 
 
 def _proofs(signal: str) -> list[str]:
-    """Return what is to be said of the steps that prove a signal on the arm."""
+    """Return the lines about the steps that prove a signal on the arm."""
     steps = ", ".join(f"{step} {step.words}" for step in PROOFS.get(signal, ()))
     return [f"Proved on the arm itself by {steps}.", ""] if steps else []
 

@@ -1,7 +1,6 @@
 """The fault matrix: every fault in every phase, through the whole program.
 
-On stepped time: what is said, what the arm does, what is on the disk, and that the
-session can be resumed.
+On stepped time, it checks the messages, the arm, the files and the resumed session.
 """
 
 import re
@@ -22,7 +21,7 @@ CODES = {
     End.COMPLETE: 0,
     End.REFUSED: 3,
     End.NOT_ACTIVATED: 3,
-    End.TOLD: 0,
+    End.REPORTED: 0,
     End.REDONE: 0,
     End.UNTARED: 3,
     End.UNBRACKETED: 0,
@@ -32,7 +31,7 @@ CODES = {
 }
 NOTHING = {End.REFUSED, End.UNSTARTED}
 SEVERAL_LINES = {End.UNWRITTEN, End.UNTARED, End.UNBRACKETED}
-WHOLE = {End.COMPLETE, End.TOLD, End.REDONE, End.UNBRACKETED}
+WHOLE = {End.COMPLETE, End.REPORTED, End.REDONE, End.UNBRACKETED}
 # One fault of each kind, each in another phase.
 DAILY = {
     ("puck-silent", "idle"),
@@ -69,7 +68,7 @@ def _attack(fault: str, phase: str, cell: Cell) -> Attack:
 
 
 def _arm_words(cell: Cell) -> str:
-    """Return what the arm does, and within which time."""
+    """Return the words about the arm's reaction and its time."""
     if cell.arm is None:
         return f"the arm {cell.at_rest}"
     return f"{cell.arm.text} within {cell.arm.limit_ms + ALLOWANCE_MS:.0f} ms"
@@ -79,14 +78,14 @@ def run_by(fault: str, phase: str) -> RunBy:
     """Return the command that runs a cell: each commit gets one of every kind."""
     if (fault, phase) in DAILY:
         return RunBy.TEST
-    is_met = _OF_ANOTHER_MOTOR.search(fault) or fault in {name for name, _ in DAILY}
-    is_in_turn = not is_met and phase == _phase_in_turn(fault)
+    is_covered = _OF_ANOTHER_MOTOR.search(fault) or fault in {name for name, _ in DAILY}
+    is_in_turn = not is_covered and phase == _phase_in_turn(fault)
     return RunBy.CI if is_in_turn or (fault, phase) in WHOLE_TRIALS else RunBy.NIGHTLY
 
 
 def _phase_in_turn(fault: str) -> str:
-    """Return the phase in which each commit meets a fault; neighbours differ in it."""
-    if fault == "suspended-1-s":  # elsewhere it takes a minute
+    """Return the phase in which CI runs a fault; it differs between neighbours."""
+    if fault == "suspended-1-s":  # other phases take a minute
         return "recording"
     phases = [phase for name, phase, _ in cells_of_all() if name == fault]
     return phases[list(TABLE).index(fault) % len(phases)]
@@ -138,7 +137,7 @@ def check_words(seen: Seen, cell: Cell) -> None:
 
 
 def check_arm(seen: Seen, cell: Cell) -> None:
-    """Hold the arm against the table, in the eyes of its pucks."""
+    """Check the arm, as its pucks see it, against the table."""
     scene = seen.scene
     assert scene.arm == cell.at_rest
     if cell.end in NOTHING:
@@ -150,16 +149,16 @@ def check_arm(seen: Seen, cell: Cell) -> None:
 
 
 def reached_ms(scene: SimulatedScene, arm: Arm) -> float | None:
-    """Return how long after the strike the arm did so; None = never."""
+    """Return the time from the fault to the reaction [ms]; None = never."""
     if arm.seen != DAMPED_OR_IDLE:
         return scene.reached_ms(arm.seen, arm.state)
-    ways = (("driven", ArmState.DAMP), ("idle", None))
-    reached = [scene.reached_ms(*way) for way in ways]
+    states = (("driven", ArmState.DAMP), ("idle", None))
+    reached = [scene.reached_ms(*state) for state in states]
     return min((ms for ms in reached if ms is not None), default=None)
 
 
 def check_truth(seen: Seen, fault: str, phase: str, cell: Cell) -> None:
-    """Hold the simulated arm itself against the limits and the printed bounds."""
+    """Check the true motion of the arm against the limits and the printed bounds."""
     scene = seen.scene
     motion = seen.truth.since(scene.struck_ns, fault)
     assert is_within(motion, promise_of(fault, cell)), motion
@@ -189,7 +188,7 @@ def check_files(seen: Seen, cell: Cell) -> None:
 
 
 def check_resume(seen: Seen, cell: Cell) -> None:
-    """A session that is not complete is completed; one that is needs nothing."""
+    """Check that an incomplete session is completed and a complete one is left."""
     if seen.folder is None:
         return
     done = resume(seen.data)
@@ -198,7 +197,7 @@ def check_resume(seen: Seen, cell: Cell) -> None:
         return
     is_left = cell.end not in WHOLE
     if cell.end is End.UNWRITTEN:
-        # What the disk has of the journal decides.
+        # The part of the journal on the disk decides.
         is_left = done.code == 0
         assert is_left or done.err.startswith("There is no unfinished session")
         return

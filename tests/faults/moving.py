@@ -1,4 +1,4 @@
-"""What each fault comes to while the arm moves by itself, in a calibration."""
+"""The expected outcome of each fault while the arm moves by itself in a calibration."""
 
 from dataclasses import replace
 
@@ -33,7 +33,7 @@ _MET = Cell(
 
 
 def _too_fast(text: str) -> Cell:
-    """Return the cell of an arm that leaves its limits with no hand on it."""
+    """Return the cell of an arm that leaves its limits without a hand on it."""
     return Cell(
         End.UNMEASURED,
         text,
@@ -63,14 +63,14 @@ _OWN = {
 _LAME = Cell(
     End.UNMEASURED, why="the arm is idled as it sinks, or a motor turns in vain"
 )
-_STOPPING = {End.ENDED, End.TOLD, End.REDONE, End.SOMEHOW}
+_STOPPING = {End.ENDED, End.REPORTED, End.REDONE, End.SOMEHOW}
 
 
 def _cell(fault: str) -> Cell:
-    """Return the cell that follows from the fault's own during a tare."""
+    """Return the cell of a fault, derived from that during a tare without its own."""
     if fault in _OWN:
         return _OWN[fault]
-    still = TABLE[fault][_TARE]
+    at_tare = TABLE[fault][_TARE]
     if fault.startswith("stuck"):
         return _IN_VAIN
     if fault.startswith("dead"):
@@ -79,9 +79,9 @@ def _cell(fault: str) -> Cell:
         return _ASTRAY
     if fault.startswith("ft-"):
         return _WEIGHED
-    if still.end in _STOPPING:
-        return replace(still, end=End.UNMEASURED, rejected=(), why="")
-    return replace(still, why="")
+    if at_tare.end in _STOPPING:
+        return replace(at_tare, end=End.UNMEASURED, rejected=(), why="")
+    return replace(at_tare, why="")
 
 
 MOVING_CELLS: dict[str, Cell] = {fault: _cell(fault) for fault in TABLE}

@@ -1,9 +1,8 @@
-"""A fault after a fault: every ordered pair, delay and phase.
+"""Two faults in succession: every ordered pair, delay and phase.
 
-Whatever the pair, four things hold: every verdict that the loop latched is told; once
-one of them idles, the arm is not driven again, whatever is pressed at the pendant; the
-session ends if either fault ends it; and no trial is kept in which the motors had no
-power.
+For every pair, each verdict that the loop latched is reported; once one of them idles
+the arm, it is not driven again, whatever is pressed at the pendant; the session ends if
+either fault ends it; and no trial is kept in which the motors had no power.
 """
 
 from collections.abc import Iterator, Sequence
@@ -29,7 +28,7 @@ _RELEASED_NS = 300 * MS  # after a fault of the circuit a person presses idle, a
 
 
 def _reported(fault: Fault) -> Strike:
-    """Return a strike of a process beside the loop."""
+    """Return a strike in which another process reports a fault."""
     return lambda scene: scene.cycle.report(verdict_for(fault))
 
 
@@ -63,7 +62,7 @@ _OF_THE_CIRCUIT = ("estop", "pendant-idle", "safety-heartbeat")
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """Two faults, the second `delay_ms` after the first, which comes in `phase`."""
+    """Two faults, the second `delay_ms` after the first, which occurs in `phase`."""
 
     first: str
     second: str
@@ -76,17 +75,17 @@ class Pair:
 
 # For each commit: pairs that differ in kind.
 EVERY_COMMIT = (
-    # What only holds, then what idles.
+    # First a fault that only holds, then one that idles.
     Pair("ft-stale", "pendant-idle", 100, "recording"),
     Pair("console-silent", "bus-shared", 60, "ready"),
     Pair("contact-force", "estop", 140, "recording"),
     Pair("move-refused", "position-jump", 60, "tare"),
-    # What damps, then what idles, and the other way round.
+    # First a fault that damps, then one that idles, and the reverse.
     Pair("overspeed", "pendant-idle", 100, "recording"),
     Pair("pendant-idle", "overspeed", 20, "recording"),
-    # What idles, then what only holds.
+    # First a fault that idles, then one that only holds.
     Pair("estop", "console-silent", 20, "review"),
-    # What holds and would idle later, beside another that does.
+    # A fault that holds, with one that holds and idles later.
     Pair("move-refused", "can-silence", 0, "review"),
     # While the arm moves by itself.
     Pair("joint-limit", "puck-silent", 20, MOVING),
@@ -104,7 +103,7 @@ def every_pair() -> Iterator[Pair]:
 
 
 def problems_of(pair: Pair, config: Path, data: Path) -> list[str]:
-    """Run a session, or a calibration, with the pair; return what did not hold."""
+    """Run a session, or a calibration, with the pair; return the problems."""
     latched: list[tuple[int, GuardVerdict]] = []
     scenes: list[SimulatedScene] = []
 
@@ -129,7 +128,7 @@ def problems_of(pair: Pair, config: Path, data: Path) -> list[str]:
 
     seen = run_with(strike, pair.phase, config, data)
     return [
-        *_untold(seen, latched),
+        *_unreported(seen, latched),
         *_driven_again(seen, latched),
         *_not_ended(seen, latched),
         *_kept_without_power(seen),
@@ -137,19 +136,20 @@ def problems_of(pair: Pair, config: Path, data: Path) -> list[str]:
 
 
 def _release(scene: SimulatedScene) -> None:
-    """Press Shift-idle and Shift-activate, though nothing asks for it."""
+    """Press Shift-idle and Shift-activate without a request by the program."""
     network = scene.rig.network
     if network.safety_mode is not SafetyMode.ACTIVE:
         network.pendant("idle")
         network.pendant("activate")
 
 
-def _untold(seen: Seen, latched: Sequence[tuple[int, GuardVerdict]]) -> list[str]:
-    said = seen.done.out + seen.done.err
-    if "Traceback" in said:
-        return [f"a traceback: {said[-600:]}"]
+def _unreported(seen: Seen, latched: Sequence[tuple[int, GuardVerdict]]) -> list[str]:
+    output = seen.done.out + seen.done.err
+    if "Traceback" in output:
+        return [f"a traceback: {output[-600:]}"]
     faults = dict.fromkeys(v.fault for _, v in latched if v.fault is not None)
-    return [f"{fault} was not told" for fault in faults if not _is_told(fault, said)]
+    unreported = [fault for fault in faults if not _is_reported(fault, output)]
+    return [f"{fault} was not told" for fault in unreported]
 
 
 _OTHER_NAMES = {
@@ -159,14 +159,14 @@ _OTHER_NAMES = {
 }
 
 
-def _is_told(fault: Fault, said: str) -> bool:
+def _is_reported(fault: Fault, output: str) -> bool:
     names = (fault.value, *_OTHER_NAMES.get(fault, ()))
-    return any(_has_words(CATALOGUE[name].what, said) for name in names)
+    return any(_has_words(CATALOGUE[name].what, output) for name in names)
 
 
-def _has_words(what: str, said: str) -> bool:
-    """Return whether the longest fixed part of a message was said."""
-    return max((words for words, *_ in Formatter().parse(what)), key=len) in said
+def _has_words(what: str, output: str) -> bool:
+    """Return whether the longest fixed part of a message is in the output."""
+    return max((words for words, *_ in Formatter().parse(what)), key=len) in output
 
 
 def _driven_again(seen: Seen, latched: Sequence[tuple[int, GuardVerdict]]) -> list[str]:
@@ -182,10 +182,10 @@ def _driven_again(seen: Seen, latched: Sequence[tuple[int, GuardVerdict]]) -> li
 def _not_ended(seen: Seen, latched: Sequence[tuple[int, GuardVerdict]]) -> list[str]:
     code = seen.done.code
     is_over = any(verdict.ends_session for _, verdict in latched)
-    # A tare that is given up, or the last one, which costs nothing, ends otherwise.
-    is_well = code in {3, 4} or (not is_over and code in {0, 5})
+    # After an abandoned tare, or a missing last one, the exit code differs.
+    is_expected = code in {3, 4} or (not is_over and code in {0, 5})
     is_at_the_end = code == 0 and "No tare at the end" in seen.done.out
-    return [] if is_well or is_at_the_end else [f"exit code {code}"]
+    return [] if is_expected or is_at_the_end else [f"exit code {code}"]
 
 
 def _kept_without_power(seen: Seen) -> list[str]:

@@ -1,4 +1,4 @@
-"""When a fault may come: the phases of a session, and what the arm does by itself."""
+"""Phases in which a fault may occur: those of a session and a move by the arm."""
 
 PHASES = ("preflight", "idle", "tare", "ready", "recording", "review", "end")
-MOVING = "moving"  # the arm by itself, between two poses of a calibration
+MOVING = "moving"  # a move by the arm between two poses of a calibration

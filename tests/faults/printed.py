@@ -31,7 +31,7 @@ def text() -> str:
 
 
 def truth_lines() -> list[str]:
-    """Return the table of what was measured, and below it the wider promises."""
+    """Return the table of measured values, with the wider promises below it."""
     head = [f"{name}, {phase}" for phase in BOUND_PHASES for name in _MEASURED]
     rows = [f"| fault | {' | '.join(head)} |", "|---" * (len(head) + 1) + "|"]
     notes: list[str] = []

@@ -31,7 +31,7 @@ from tests.processes.watching import (
     wait,
 )
 
-TRIES = 5  # a session may stop because the machine stood still
+TRIES = 5  # a session may stop because the machine stalled
 REACTION = 0.6  # s, from the fault to an arm that holds or is idle
 SAFE = {ArmState.HOLD, ArmState.DAMP, ArmState.IDLE}
 BRAKED = {SafetyMode.IDLE, SafetyMode.E_STOP}
@@ -53,7 +53,7 @@ DAILY = {
     ("terminal closed", "idle"),
 }
 
-# The program, its operator waiting at one prompt until the fault has come.
+# The program, with an operator that waits at one prompt until the fault has occurred.
 START = """
 import fcntl, sys, termios
 if sys.stdout.isatty():
@@ -109,7 +109,7 @@ class SimulatedScene:
     is_closing: bool = False
 
     def read_terminal(self):
-        """Take what is shown, or the program would wait for whoever reads it."""
+        """Read the output, since the program blocks on a full terminal."""
         with contextlib.suppress(OSError):
             while not self.is_closing:
                 if select.select([self.terminal], [], [], 0.05)[0]:
@@ -119,7 +119,7 @@ class SimulatedScene:
         """Close the window; a second call does nothing."""
         if not self.is_closing:
             self.is_closing = True
-            wait(0.1)  # nobody reads any more
+            wait(0.1)  # the reader has stopped
             os.close(self.terminal)
 
     def go_on(self):
@@ -128,7 +128,7 @@ class SimulatedScene:
 
 @contextmanager
 def waiting_in(phase, folder, fault):
-    """Start a session and let it wait in `phase`; end what is left of it."""
+    """Start a session that waits in `phase`; end its processes afterwards."""
     data = folder / "data"
     data.mkdir()
     marker = folder / "there"
@@ -166,12 +166,12 @@ def waiting_in(phase, folder, fault):
 
 
 def codes_of(fault, cell):
-    """Return the exit codes; a second Ctrl-C may come when the session has ended."""
+    """Return the exit codes; a second Ctrl-C may follow the end of the session."""
     return CODES[cell.end] | ({130} if fault == "SIGINT twice" else set())
 
 
 def arrive(scene, phase):
-    """Return when the session waits in `phase`; False if the machine is too slow."""
+    """Wait for the session in `phase`; return False if the machine is too slow."""
     seen = scene.seen
 
     def is_there():
@@ -184,14 +184,14 @@ def arrive(scene, phase):
         return False
     children = children_of(seen.process.pid)
     seen.pids = {name: children[short] for name, short in NAMES.items()}
-    wait(0.5)  # it is in the middle of it, not at its beginning
+    wait(0.5)  # the session is in the middle of the phase
     if phase != "preflight":
         seen.attach()
     return True
 
 
 def inject(scene, fault):
-    """Let `fault` happen."""
+    """Cause `fault`."""
     seen, console = scene.seen, scene.seen.process.pid
     if fault.endswith(" killed"):
         seen.kill(fault.removesuffix(" killed"))
@@ -207,16 +207,16 @@ def inject(scene, fault):
 
 def is_safe(seen):
     if seen.shared is None:
-        return True  # nobody has asked for the arm
+        return True  # the arm is not in use yet
     if is_running(seen.pids["control"]) and seen.status().is_running:
         return seen.status().control.state in SAFE
     if not is_running(seen.pids["fake rig"]):
-        return True  # it goes last, when the arm is idle
+        return True  # the rig ends last, when the arm is idle
     return seen.pucks_mode() in BRAKED
 
 
 def process_attacks() -> list[Attack]:
-    """Return what befalls a process, in each phase."""
+    """Return every fault of a process in each phase."""
     return [
         _attack(fault, phase, cell)
         for fault, row in TABLE.items()
@@ -243,7 +243,7 @@ def _attack(fault: str, phase: str, cell: Cell) -> Attack:
 
 
 def is_survived(folder, fault, phase, cell):
-    """Hold one session against the table; False if the machine's stall came first."""
+    """Check one session against the table; return False if it stalled first."""
     folder.mkdir()
     with waiting_in(phase, folder, fault) as scene:
         seen = scene.seen
@@ -268,7 +268,7 @@ def is_survived(folder, fault, phase, cell):
 
 
 def check_resume(data, cell):
-    """What was begun is completed; where nothing was begun nothing is left."""
+    """Check that a begun session is completed and leaves no partial trial."""
     if not (data / "sessions").exists():
         return
     done = traction("resume", "--fast", "--operator-script", "auto", "--data", data)

@@ -1,4 +1,4 @@
-"""What befalls processes, signals and the disk in each phase, as data."""
+"""The expected outcome of faults of processes, signals and the disk, as data."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The whole program with one fault in one phase, and the arm as its pucks saw it."""
+"""The whole program with one fault in one phase, and the arm as seen by its pucks."""
 
 import shutil
 from collections.abc import Callable
@@ -30,10 +30,10 @@ from wam.calibration import poses
 MS = 1_000_000
 CALIBRATION = "gravity.toml"
 _AFTERWARDS_NS = 500 * MS
-MOVING_SPEED = 0.3  # rad/s; the trapezoid is on its way
+MOVING_SPEED = 0.3  # rad/s; the move is under way
 _FRESH_NS = 5 * MS  # torques older than two cycles are the last ones
 _PROMPTS = {
-    "tare": (Prompt.LIFT, 0.9),  # still since 0.6 s, the mean is being taken
+    "tare": (Prompt.LIFT, 0.9),  # at rest since 0.6 s, the mean is being taken
     "ready": (Prompt.READY, 0.06),
     "recording": (Prompt.RECORDING, 0.2),
     "review": (Prompt.REVIEW, 0.06),
@@ -43,7 +43,7 @@ _PROMPTS = {
 
 @dataclass(slots=True)
 class SimulatedScene:
-    """What a fault can reach: the simulated devices and the loop's cycle."""
+    """The simulated devices and the loop's cycle, which a fault can change."""
 
     rig: FakeRig
     clock: Clock
@@ -59,7 +59,7 @@ class SimulatedScene:
     )
 
     def act(self) -> None:
-        """Do what is due by now."""
+        """Carry out the actions that are due."""
         now_ns = self.clock.now_ns()
         ready = [action for at_ns, action in self.due if at_ns <= now_ns]
         self.due = [row for row in self.due if row[0] > now_ns]
@@ -67,13 +67,13 @@ class SimulatedScene:
             action(self)
 
     def clear_faults(self) -> None:
-        """Give the guard its limits back."""
+        """Restore the limits of the guard."""
         if self.usual_limits is not None:
             self.cycle.limits, self.usual_limits = self.usual_limits, None
 
     @property
     def arm(self) -> str:
-        """What the arm does, in the eyes of its pucks."""
+        """The state of the arm as seen by its pucks."""
         network = self.rig.network
         if network.safety_mode is SafetyMode.E_STOP:
             return "without power"
@@ -83,21 +83,21 @@ class SimulatedScene:
         return "driven" if is_fresh else "last torques"
 
     def look(self) -> None:
-        """Note what the arm does now, when it is something else than before."""
+        """Record the state of the arm when it has changed."""
         state = self.cycle.status.state if self.cycle else ArmState.IDLE
         now = (self.arm, state)
         if not self.seen or self.seen[-1][1:] != now:
             self.seen.append((self.clock.now_ns(), *now))
 
     def reached_ms(self, arm: str, state: ArmState | None) -> float | None:
-        """Return how long after the strike the arm did this; None = never."""
+        """Return the time from the strike to this state [ms]; None = never."""
         for at_ns, *found in self.seen_since():
             if found[0] == arm and state in (None, found[1]):
                 return (at_ns - self.struck_ns) / MS
         return None
 
     def seen_since(self):
-        """Return what the arm did from the strike on."""
+        """Return the states of the arm from the strike on."""
         before = [row for row in self.seen if row[0] <= self.struck_ns]
         after = [row for row in self.seen if row[0] > self.struck_ns]
         return [(self.struck_ns, *row[1:]) for row in before[-1:]] + after
@@ -105,7 +105,7 @@ class SimulatedScene:
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """How it ended: what was said, what is on the disk, what the arm did."""
+    """The outcome of a run: messages, files, and states of the arm."""
 
     done: Done
     scene: SimulatedScene
@@ -115,7 +115,7 @@ class Seen:
 
     @property
     def written(self) -> Path | None:
-        """The calibration that was written; None = none was."""
+        """The written calibration; None = none was written."""
         path = self.data / CALIBRATION
         return path if path.exists() else None
 
@@ -135,9 +135,9 @@ Strike = Callable[[SimulatedScene], None]
 
 
 def run_with(inject: Strike, phase: str, config: Path, data: Path) -> Seen:
-    """Run a session of one trial in which `inject` comes once, in `phase`.
+    """Run a session of one trial in which `inject` is called once, in `phase`.
 
-    While the arm moves by itself, it is a short calibration of gravity.
+    In the phase MOVING, run a short calibration of gravity instead.
     """
     with pytest.MonkeyPatch.context() as patch:
         logs, scenes = watch_truth(patch), _watch(patch)
@@ -154,7 +154,7 @@ def run_with(inject: Strike, phase: str, config: Path, data: Path) -> Seen:
 def run_whole(
     inject: Strike, seconds: float, config: Path, data: Path, friction: float
 ) -> Seen:
-    """Run a session of one whole trial, struck after so many of its seconds."""
+    """Run a session of one whole trial; call `inject` after `seconds` of it."""
     with pytest.MonkeyPatch.context() as patch:
         logs, scenes = watch_truth(patch), _watch(patch)
         usual_answer = AutoOperator.answer
@@ -178,7 +178,7 @@ def run_whole(
 
 
 def _let_the_world_go_on(scene: SimulatedScene) -> None:
-    """Let the arm do what it does when the program is gone."""
+    """Let the simulation go on after the end of the program."""
     rig, clock = scene.rig, scene.clock
     for cycle in range(_AFTERWARDS_NS // PERIOD_NS):
         rig.advance(clock.now_ns() + (cycle + 1) * PERIOD_NS)
@@ -197,7 +197,7 @@ def _calibrate(patch: pytest.MonkeyPatch, config: Path, data: Path) -> Done:
 
 
 def resume(data: Path) -> Done:
-    """Go on with the session on a rig that is well again."""
+    """Resume the session on a repaired rig."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(AutoOperator, "answer", lambda _, asked: _press(asked))
         return traction("resume", "--operator-script", "auto", "--data", data)
@@ -210,7 +210,7 @@ def copied(data: Path, target: Path) -> Path:
 
 
 def _press(asked) -> str:
-    """Press the keys that make a session short."""
+    """Return the key for a short session."""
     waits = {Prompt.READY: (0.3, " "), Prompt.RECORDING: (0.5, " ")}
     waits[Prompt.UNDO] = (0.3, " ")
     wait, key = waits.get(asked.prompt, (0.3, "k"))
@@ -224,7 +224,7 @@ def _press(asked) -> str:
 
 
 def _watch(patch: pytest.MonkeyPatch) -> list[SimulatedScene]:
-    """Let every simulated rig, cycle and torque frame be seen."""
+    """Record every simulated rig, cycle and torque frame in the scenes."""
     scenes: list[SimulatedScene] = []
 
     class Rig(plain_world.FakeRig):
@@ -250,11 +250,11 @@ def _watch(patch: pytest.MonkeyPatch) -> list[SimulatedScene]:
         finally:
             scene.look()
 
-    usual_mend = LocalSimulation.clear_faults
+    usual_clear = LocalSimulation.clear_faults
 
     def clear_faults(simulation):
         scenes[-1].clear_faults()
-        usual_mend(simulation)
+        usual_clear(simulation)
 
     patch.setattr(LocalSimulation, "clear_faults", clear_faults)
     patch.setattr(plain_world, "FakeRig", Rig)
@@ -263,7 +263,7 @@ def _watch(patch: pytest.MonkeyPatch) -> list[SimulatedScene]:
 
 
 def _at(patch, phase: str, scenes: list[SimulatedScene], inject: Strike) -> None:
-    """Let `inject` come once, in `phase`."""
+    """Call `inject` once, in `phase`."""
 
     def strike_once() -> None:
         scene = scenes[0]
@@ -288,7 +288,7 @@ def _at(patch, phase: str, scenes: list[SimulatedScene], inject: Strike) -> None
         return _press(asked) if phase != "end" or asked.prompt is not prompt else ""
 
     patch.setattr(AutoOperator, "answer", answer)
-    if phase == "end":  # a person, who can take the last verdict back
+    if phase == "end":  # a person, who can undo the last verdict
         patch.setattr(AutoOperator, "who", "mk")
     if phase == "preflight":
         _before(patch, experiments.run.session, "run_preflight", strike_once)
@@ -301,7 +301,7 @@ def _before(patch, module, name: str, first, idle: float = 0.0) -> None:
 
     def replaced(*given, **named):
         first()
-        if idle:  # the arm stays as it is for a while: the loop runs, nobody asks
+        if idle:  # the loop runs for a while without a request
             given[0].loop_client.advance(idle)
         return usual(*given, **named)
 
@@ -309,5 +309,5 @@ def _before(patch, module, name: str, first, idle: float = 0.0) -> None:
 
 
 def inject(name: str) -> Strike:
-    """Return the strike that a rehearsal calls `name`."""
+    """Return the strike of the rehearsal's fault `name`."""
     return lambda scene: LocalSimulation(scene.rig).inject(name)

@@ -1,4 +1,4 @@
-"""Every device and guard fault of the matrix, and how it is done."""
+"""Every device and guard fault of the matrix and its simulation."""
 
 import errno
 import os
@@ -24,7 +24,7 @@ from wam.driver.settings import ArmSettings
 from wam.driver.transmission import Transmission
 
 _J2, _J6 = 1, 5
-_ALMOST = 0.95  # of what driver and guard believe
+_ALMOST = 0.95  # of what driver and guard accept
 _PERIOD = 0.002  # s
 _LONG_BEAT_NS = 1000 * MS
 _ARM_SETTINGS = ArmSettings()
@@ -33,7 +33,7 @@ _SPEEDS = np.array(_ARM_SETTINGS.speed_limits)
 
 
 def _tighten(change: Callable[[SimulatedScene], dict[str, object]]) -> Strike:
-    """Return a strike that moves limits to where the arm is, until it is mended."""
+    """Return a strike that moves limits to the state of the arm until its repair."""
 
     def inject(scene: SimulatedScene) -> None:
         cycle = scene.cycle
@@ -51,7 +51,7 @@ def _behind_a_stop(scene: SimulatedScene) -> dict[str, object]:
 
 def _weak(scene: SimulatedScene) -> dict[str, object]:
     tau = list(scene.cycle.limits.torque)
-    tau[_J2] = 0.5  # the arm's weight is more
+    tau[_J2] = 0.5  # less than the arm's weight needs
     return {"torque": tuple(tau)}
 
 
@@ -62,13 +62,13 @@ def _swing(scene: SimulatedScene) -> dict[str, object]:
 
 
 def _nonsense(scene: SimulatedScene) -> None:
-    """Let the control law come to no number."""
+    """Let the control law return NaN."""
     nan = np.full(7, np.nan)
     scene.patch.setattr(FootController, "torque", lambda *_: (nan, nan))
 
 
 def _stall(duration_ms: int) -> Strike:
-    """Return a strike that takes the computer away from the loop."""
+    """Return a strike that suspends the loop."""
 
     def inject(scene: SimulatedScene) -> None:
         clock = scene.clock
@@ -99,24 +99,24 @@ def _transmission(scene: SimulatedScene) -> Transmission:
 
 
 def _step_lie(motor: int) -> Strike:
-    """Return a strike after which a motor tells a place that it just cannot be at.
+    """Return a strike after which the reported position of a motor has a false step.
 
-    It is the largest step that the driver believes in one cycle, and it stays. It
-    begins in a cycle behind one that asked for positions, too: over the cycle that is
-    left out, one in 250, the same step seems half as fast.
+    The step is the largest that the driver accepts in one cycle, and it stays. It
+    begins in a cycle after one that requested positions: over the cycle without a
+    request, one in 250, the same step seems half as fast.
     """
 
     def inject(scene: SimulatedScene) -> None:
         fastest = _transmission(scene).fastest_counts(_SPEEDS)[motor - 1]
         step = int(_ALMOST * _ARM_SETTINGS.jump_margin * fastest * _PERIOD)
-        told_ns, lies = 0, False
+        reported_ns, is_false = 0, False
 
         def lie(counts: int) -> int:
-            nonlocal told_ns, lies
+            nonlocal reported_ns, is_false
             now_ns = scene.clock.now_ns()
-            lies = lies or now_ns - told_ns < 1.5 * _PERIOD * 1e9
-            told_ns = now_ns
-            return counts + step if lies else counts
+            is_false = is_false or now_ns - reported_ns < 1.5 * _PERIOD * 1e9
+            reported_ns = now_ns
+            return counts + step if is_false else counts
 
         scene.rig.network.faults.falsify(position_reply_id(motor), lie)
 
@@ -126,12 +126,12 @@ def _step_lie(motor: int) -> Strike:
 def _creeping_lie(motor: int) -> Strike:
     """Return a strike after which a motor's position creeps away from the truth.
 
-    It creeps as fast as it may without a joint's seeming too fast for the guard.
+    It creeps as fast as possible within the guard's limits of joint speed.
     """
 
     def inject(scene: SimulatedScene) -> None:
-        one = [int(node == motor) for node in MOTOR_NODES]
-        turned = np.abs(_transmission(scene).joints(one))  # rad per count
+        count = [int(node == motor) for node in MOTOR_NODES]
+        turned = np.abs(_transmission(scene).joints(count))  # rad per count
         rate = _ALMOST * float((_SPEEDS[turned > 0] / turned[turned > 0]).min())
         begin_ns = scene.clock.now_ns()
 
@@ -144,7 +144,7 @@ def _creeping_lie(motor: int) -> Strike:
 
 
 def _stuck(motor: int) -> Strike:
-    """Return a strike after which a motor goes on telling the place it is at now."""
+    """Return a strike that freezes the reported position of a motor."""
 
     def inject(scene: SimulatedScene) -> None:
         here = scene.rig.plant.counts()[motor - 1]
@@ -155,7 +155,7 @@ def _stuck(motor: int) -> Strike:
 
 
 def _deaf(motor: int) -> Strike:
-    """Return a strike in which a puck misses that the pendant idles the arm."""
+    """Return a strike in which the pendant idles the arm and a puck misses it."""
 
     def inject(scene: SimulatedScene) -> None:
         scene.rig.network.deafen(motor)
@@ -192,24 +192,24 @@ def _late(late_ns: int) -> Strike:
 
 
 def _let_go(scene: SimulatedScene) -> None:
-    """Let the person go away; nothing bears the arm."""
+    """Let the person release the arm, which is then unsupported."""
     scene.rig.plant.hand.let_go()
     scene.rig.plant.support = Support.NONE
 
 
 def _drag(scene: SimulatedScene) -> None:
-    """Let the person draw the foot away, whatever is asked of the arm."""
+    """Let the person pull the foot away against the arm."""
     scene.rig.plant.hand.carry(_FAR_AWAY)
 
 
 def _stall_under_a_long_heartbeat(scene: SimulatedScene) -> None:
-    """Take the computer away for 150 ms; the module would wait for a second."""
+    """Suspend the loop for 150 ms with a heartbeat limit of 1 s."""
     scene.rig.network.set_heartbeat(_LONG_BEAT_NS)
     _stall(150)(scene)
 
 
 def _suspended(scene: SimulatedScene) -> None:
-    """Take the computer away for 1 s; somebody activates the arm again meanwhile."""
+    """Suspend the loop for 1 s; meanwhile a person activates the arm again."""
     _stall(900)(scene)
     scene.rig.network.pendant("idle")
     scene.rig.network.pendant("activate")
@@ -217,13 +217,13 @@ def _suspended(scene: SimulatedScene) -> None:
 
 
 def _long_heartbeat_and_silence(scene: SimulatedScene) -> None:
-    """Silence the arm; the module would wait for a second."""
+    """Silence the arm with a heartbeat limit of 1 s."""
     scene.rig.network.set_heartbeat(_LONG_BEAT_NS)
     inject("can-silence")(scene)
 
 
 def _second_command(_: SimulatedScene) -> None:
-    """Start another command for an arm that this process has: it has to be refused."""
+    """Start another command for the arm of this process; check that it is refused."""
     with tempfile.TemporaryDirectory(prefix="second-") as scratch:
         config = write_config(Path(scratch), rig=('"socketcan" ', '"traction-fake" '))
         channel = f"{scratch}/bus"
@@ -275,5 +275,5 @@ _BY_HAND: dict[str, Strike] = {
 
 
 def strike_of(name: str) -> Strike:
-    """Return what `name` does; most names are those of `--fault`."""
+    """Return the strike of `name`; most names are those of `--fault`."""
     return _BY_HAND.get(name) or inject(name)

@@ -1,4 +1,4 @@
-"""Every fault of the guard has its reaction, with its reason, in tables and page."""
+"""Tables and page state the reaction to every fault of the guard and its reason."""
 
 from pathlib import Path
 

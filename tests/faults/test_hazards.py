@@ -1,4 +1,4 @@
-"""The table of hazards is whole and names tests that exist."""
+"""The table of hazards is complete and names tests that exist."""
 
 import ast
 import re
@@ -75,7 +75,7 @@ def test_a_hazard_names_existing_tests_and_its_bound(row):
 def test_every_fault_of_the_matrix_is_a_cause_of_some_hazard():
     named = {fault for row in hazards() for fault in row.faults}
     assert named <= set(TABLE)
-    # What only warns, or comes from the person who leads the arm, is no lost signal.
+    # A mere warning or a motion of the person who leads the arm is no lost signal.
     assert set(TABLE) - named == {
         "nothing",
         "hand-gone",

@@ -27,7 +27,7 @@ def test_a_fault_has_the_outcome_in_the_table(row, tmp_path):
 def test_late_positions_are_detected_in_time_at_any_moment_of_a_move(
     fault, speed, tmp_path, monkeypatch
 ):
-    # The cycle that asks for none comes just after the strike, or a tenth of a second.
+    # The cycle without a request follows the strike at once or after 0.1 s.
     monkeypatch.setattr(rehearse, "MOVING_SPEED", speed)
     seen = run_with(strike_of(fault), MOVING, write_config(tmp_path), tmp_path / "data")
     motion = seen.truth.since(seen.scene.struck_ns, fault)

@@ -1,4 +1,4 @@
-"""A fault after a fault: those that differ in kind for each commit."""
+"""Two faults in succession have the stricter outcome."""
 
 import pytest
 

@@ -10,7 +10,7 @@ from tests.faults.truth import Promise, is_within
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(240)]
 IN_MOTION = 2.0  # s after the start of the recording
-LEADING = range(2, 7)  # motors without which no foot is led
+LEADING = range(2, 7)  # motors that turn whenever a foot is led
 STANDING = (1, 7)
 
 
@@ -46,10 +46,12 @@ def test_a_sound_arm_completes_a_trial_with_any_friction(config, tmp_path, frict
 
 
 @pytest.mark.parametrize("motor", STANDING)
-def test_a_frozen_motor_that_hardly_turns_is_harmless(config, tmp_path, motor):
-    """It is not noticed: neither bears weight, and both may stand in a trial.
+def test_a_frozen_motor_that_hardly_turns_moves_the_arm_within_bounds(
+    config, tmp_path, motor
+):
+    """The fault is not detected: neither bears weight, and both may rest in a trial.
 
-    The lock does not feel joint 7 turn, so the ground turns the foot as it likes.
+    The lock does not detect that joint 7 turns, so the ground turns the foot.
     """
     strike = strike_of(f"stuck-motor-{motor}")
     seen = run_whole(strike, IN_MOTION, config, tmp_path / "data", 0.02)

@@ -1,4 +1,4 @@
-"""What the simulated arm truly does after a fault, and what it never may do.
+"""The true motion of the simulated arm after a fault, and its promised bounds.
 
 Nothing here comes from the driver: positions, velocities, torques and forces are those
 of the simulated plant, every 2 ms, from the fault to the end of the command.
@@ -18,23 +18,23 @@ from wam.model.constants import load_constants
 from wam.model.tool import Tool
 
 MS = 1_000_000
-WINDOW_NS = 500 * MS  # travel is counted so long after a fault
+WINDOW_NS = 500 * MS  # travel is measured for this time after a fault
 BLOW_NS = 150 * MS  # a blow to a joint is over after this
 SPEED_LIMITS = np.array([1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0])  # rad/s, of rig.toml
 BLOWS = {"overspeed": 6.0, "foot-speed": 5.0}  # rad/s that the fault itself gives
 _PERIOD_NS = 2 * MS
-_LATEST_NS = 3_000 * MS  # idle or at rest later than this: not of the fault
-_STILL, _STANDS_NS = 0.03, 100 * MS  # m/s of a sole that stands, for so long
+_LATEST_NS = 3_000 * MS  # idle or rest after this time is not due to the fault
+_STILL, _STANDS_NS = 0.03, 100 * MS  # m/s of a sole at rest, for this time
 
 
 @dataclass(frozen=True, slots=True)
 class TrueMotion:
-    """The worst that truly happened from a fault on.
+    """The largest true values after a fault.
 
     Attributes:
         speed: largest joint speed as a share of the joint's limit in rig.toml.
         joint: the joint that had it, 1-7.
-        travel: farthest that the sole was from its place within 0.5 s [m].
+        travel: largest distance of the sole from its first place within 0.5 s [m].
         drive: largest force that the motors, beyond the arm's weight, put on the person
             who holds the sole [N].
         hand: largest force between the arm and the operator's hand [N].
@@ -55,10 +55,10 @@ class TrueMotion:
 
 @dataclass(frozen=True, slots=True)
 class Promise:
-    """What nothing may exceed; fields as of `TrueMotion`, those that it has.
+    """Bounds of a true motion, with some of the fields of `TrueMotion`.
 
     Attributes:
-        why: why it is another one than that of most faults.
+        why: the reason for bounds other than those of most faults.
     """
 
     speed: float = 1.0
@@ -113,7 +113,7 @@ STOPPING = Promise(travel=0.1)
 
 
 def promise_of(fault: str, cell: Cell) -> Promise:
-    """Return what is promised of a fault that comes to `cell`."""
+    """Return the promised bounds of a fault with the outcome `cell`."""
     if cell.at_rest == NO_POWER:
         return FALLING
     if fault.startswith("creep"):
@@ -145,7 +145,7 @@ class TruthLog:
     """Rows of the plant while a command runs, one per cycle.
 
     Attributes:
-        plant: whose truth it is.
+        plant: the simulated arm.
         tool: below the wrist.
         drive: torques of the motors at the joints [N m], shape (7,).
         hand: force of the operator's hand [N].
@@ -159,7 +159,7 @@ class TruthLog:
     hand: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def look(self) -> None:
-        """Take a row when a cycle has passed."""
+        """Record a row when a cycle has passed."""
         plant = self.plant
         if self.t_ns and plant.t_ns < self.t_ns[-1] + _PERIOD_NS:
             return
@@ -169,7 +169,7 @@ class TruthLog:
         self.rows.append(np.concatenate(parts))
 
     def since(self, struck_ns: int, fault: str) -> TrueMotion:
-        """Return the worst from `struck_ns` on, the blow of `fault` itself left out."""
+        """Return the largest values from `struck_ns` on without the blow of `fault`."""
         t_ns = np.array(self.t_ns)
         begin = max(int(np.searchsorted(t_ns, struck_ns)) - 1, 0)
         rows, after_ns = np.array(self.rows[begin:]), t_ns[begin:] - struck_ns
@@ -204,14 +204,14 @@ class TruthLog:
 
 
 def _stands(pace):
-    """Return in which cycles the sole begins to stand for a while, shape (n,)."""
+    """Return the cycles in which the sole begins to rest, shape (n,)."""
     window = _STANDS_NS // _PERIOD_NS
     moves = np.concatenate([pace > _STILL, np.ones(window - 1, bool)])
     return ~sliding_window_view(moves, window).any(axis=1)
 
 
 def _first_ms(after_ns, happened) -> float | None:
-    """Return when something first happened after the fault [ms]."""
+    """Return the first time after the fault when `happened` is true [ms]."""
     when = after_ns[happened & (after_ns >= 0)]
     return float(when[0]) / MS if len(when) and when[0] <= _LATEST_NS else None
 
@@ -249,7 +249,7 @@ def watch_truth(patch: pytest.MonkeyPatch) -> list[TruthLog]:
 
 
 def _noting(step, log: TruthLog):
-    """Return the hand's step, which notes its force in `log` too."""
+    """Return the hand's step, which also records its force in `log`."""
 
     def noted(view):
         log.hand = step(view)
