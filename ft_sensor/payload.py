@@ -1,4 +1,4 @@
-"""Contact force: from the sensor's reading to the ground's force on the foot.
+"""Contact force and slip velocity: from the sensor's reading to force on the foot.
 
 Pure functions, used live in the loop and offline by the analysis. With f the load on
 the sensor, m_b and c_b mass and centre of mass below the gauges, g_w = (0, 0, -g):

@@ -16,7 +16,7 @@ from acquisition.control_loop.faults import (
 )
 from acquisition.control_loop.guard import GuardState, Observation, check
 from acquisition.control_loop.law import ControlLaw, FootObserver
-from acquisition.control_loop.limits import GuardLimits, bounded_torque
+from acquisition.control_loop.limits import GuardLimits, limit_torque
 from acquisition.control_loop.loop import Tick
 from acquisition.control_loop.powered_tests import PoweredTestGoal
 from acquisition.control_loop.states import (
@@ -202,7 +202,7 @@ class Cycle:
         # torques of a false position must be replaced.
         is_known = reading.is_complete or reading.jump is not None
         if is_known and status.state not in _UNPOWERED:
-            bounded = bounded_torque(tau, sent, self.limits.torque)
+            bounded = limit_torque(tau, sent, self.limits.torque)
             sent = self._arm.send(bounded, tau_gravity)
         # Torques are sent; the following results are checked in the next cycle.
         is_new = self._feed.poll(tick.now_ns, self.limits.ft_stale_ms)

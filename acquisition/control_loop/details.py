@@ -66,14 +66,14 @@ class SafetySilence:
 
 
 @dataclass(frozen=True, slots=True)
-class StuckMotor:
+class StalledMotor:
     """Motor, 1-7, that a move drives without moving it."""
 
     motor: int
 
 
 @dataclass(frozen=True, slots=True)
-class StillMotor:
+class FrozenEncoder:
     """A motor that does not turn in a trial.
 
     Attributes:
@@ -199,8 +199,8 @@ FaultDetail = (
     | MotorChange
     | SafetySilence
     | PositionJump
-    | StuckMotor
-    | StillMotor
+    | StalledMotor
+    | FrozenEncoder
     | ForeignFrame
     | MotionExcess
     | JointExcess

@@ -18,6 +18,7 @@ from acquisition.control_loop.details import (
     ForceAge,
     ForceGrowth,
     ForeignFrame,
+    FrozenEncoder,
     Joint7Slip,
     JointExcess,
     LateCycles,
@@ -28,8 +29,7 @@ from acquisition.control_loop.details import (
     ReplySilence,
     SafetySilence,
     Saturation,
-    StillMotor,
-    StuckMotor,
+    StalledMotor,
 )
 from acquisition.devices import MotorChange, PositionJump
 
@@ -59,13 +59,13 @@ class Fault(StrEnum):
     REPLIES_LATE = "replies-late"
     SAFETY_SILENT = "safety-silent"
     POSITION_JUMP = "position-jump"
-    MOTOR_STUCK = "motor-stuck"
-    MOTOR_STILL = "motor-still"
+    MOTOR_STALLED = "motor-stuck"
+    ENCODER_FROZEN = "motor-still"
     BUS_SHARED = "bus-shared"
     PUCK_CHANGED = "puck-changed"
     PUCK_DISOBEYS = "puck-disobeys"
     PUCK_DOUBLED = "puck-doubled"
-    NOT_ASKED_ACTIVE = "not-asked-active"
+    UNREQUESTED_ACTIVE = "not-asked-active"
     NOT_ACTIVE = "arm-not-active"
     ACTIVATION_MOTION = "activation-motion"
     HOLD_MOTION = "hold-motion"
@@ -125,13 +125,13 @@ FAULTS: Mapping[Fault, FaultSpec] = {
     Fault.POSITION_JUMP: FaultSpec(
         (Action.HOLD, Action.IDLE), PositionJump, ends_session=True
     ),
-    Fault.MOTOR_STUCK: FaultSpec(_IDLE, StuckMotor, ends_session=True),
-    Fault.MOTOR_STILL: FaultSpec(_IDLE, StillMotor, ends_session=True),
+    Fault.MOTOR_STALLED: FaultSpec(_IDLE, StalledMotor, ends_session=True),
+    Fault.ENCODER_FROZEN: FaultSpec(_IDLE, FrozenEncoder, ends_session=True),
     Fault.BUS_SHARED: FaultSpec(_IDLE, ForeignFrame, ends_session=True),
     Fault.PUCK_CHANGED: FaultSpec(_IDLE, MotorChange, ends_session=True),
     Fault.PUCK_DISOBEYS: FaultSpec(_IDLE, MotorChange, ends_session=True),
     Fault.PUCK_DOUBLED: FaultSpec(_IDLE, DoubledPuck, ends_session=True),
-    Fault.NOT_ASKED_ACTIVE: FaultSpec(_IDLE, ends_session=True),
+    Fault.UNREQUESTED_ACTIVE: FaultSpec(_IDLE, ends_session=True),
     Fault.NOT_ACTIVE: FaultSpec(_IDLE, ends_session=True),
     Fault.ACTIVATION_MOTION: FaultSpec(_IDLE, MotionExcess, ends_session=True),
     Fault.HOLD_MOTION: FaultSpec(_IDLE, MotionExcess, ends_session=True),

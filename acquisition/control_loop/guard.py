@@ -16,6 +16,7 @@ from acquisition.control_loop.details import (
     FootSpeedExcess,
     ForceAge,
     ForeignFrame,
+    FrozenEncoder,
     Joint7Slip,
     JointExcess,
     LateCycles,
@@ -23,8 +24,7 @@ from acquisition.control_loop.details import (
     LoopGap,
     ReplySilence,
     SafetySilence,
-    StillMotor,
-    StuckMotor,
+    StalledMotor,
 )
 from acquisition.control_loop.faults import OK, Fault, GuardVerdict, verdict_for
 from acquisition.control_loop.limits import GuardLimits
@@ -196,7 +196,7 @@ def _check_idle(seen: Observation) -> GuardVerdict:
         if seen.reading.doubled:
             return verdict_for(Fault.PUCK_DOUBLED, DoubledPuck(seen.reading.doubled))
         if seen.safety is SafetyMode.ACTIVE:
-            return verdict_for(Fault.NOT_ASKED_ACTIVE)
+            return verdict_for(Fault.UNREQUESTED_ACTIVE)
     if seen.is_recording or (seen.is_commanded and not seen.is_starting):
         return verdict_for(Fault.NOT_ACTIVE)
     return OK
@@ -349,7 +349,7 @@ def _check_move(facts: Facts) -> GuardVerdict:
     motor = facts.seen.stuck_motor
     if not motor:
         return OK
-    return verdict_for(Fault.MOTOR_STUCK, StuckMotor(motor))
+    return verdict_for(Fault.MOTOR_STALLED, StalledMotor(motor))
 
 
 def _check_numbers(facts: Facts) -> GuardVerdict:
@@ -418,8 +418,8 @@ def _check_rests(facts: Facts) -> GuardVerdict:
     for i, rest in enumerate(facts.state.rests):
         travel, limit = dist(rest.sole, sole), facts.limits.still_travel[i]
         if travel > limit:
-            detail = StillMotor(i + 1, 1e3 * travel, 1e3 * limit)  # mm
-            return verdict_for(Fault.MOTOR_STILL, detail)
+            detail = FrozenEncoder(i + 1, 1e3 * travel, 1e3 * limit)  # mm
+            return verdict_for(Fault.ENCODER_FROZEN, detail)
     return OK
 
 

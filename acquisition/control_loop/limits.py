@@ -1,6 +1,6 @@
 """Limits of the guard and of every torque command.
 
-Every command passes `bounded_torque` right before it is sent, in every state and after
+Every command passes `limit_torque` right before it is sent, in every state and after
 every verdict: it limits torque and rate of change.
 """
 
@@ -60,7 +60,7 @@ class GuardLimits:
         idle_after_late_ms: time without a punctual cycle that leads to idle [ms]. A
             single stall is one late cycle and does not count.
         idle_after_gap_ms: duration of a stall of the loop that leads to idle [ms]. The
-            safety module's heartbeat idles the arm after 100 ms.
+            safety module's watchdog idles the arm after 100 ms.
         armed_inside: a joint's position limit is armed once the joint was this far
             inside [rad]: the home position lies on two stops.
         motion: limits of the motion of a driven arm.
@@ -100,19 +100,19 @@ class GuardLimits:
             raise ValueError(f"limits of {_JOINTS} joints have {lengths} numbers")
 
 
-# Rate limit: largest change of a torque per cycle as a share of its limit; from zero to
-# the limit takes 20 ms. In simulated sessions the largest change of a driven arm is
-# 0.041 (1.8 N m at joint 2, when a trial begins to float), of the locked joint 7 0.018.
-# The start of torques, a step of 26 N m at joint 2, takes 12 ms while idle, sooner than
-# the pendant can activate the arm. Joint 7 is light and its lock stiff: at 0.1 the
-# delayed lock accelerates the joint instead (17 rad/s after a twist of 1.2 N m), at 0.3
-# it does not, and one false position causes 0.8 rad/s.
-TORQUE_STEP = (0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.3)
-_GENTLE_STEP = tuple(0.99 * step for step in TORQUE_STEP)  # margin for rounding
+# Slew-rate limit: largest change of a torque per cycle as a share of its limit; from
+# zero to the limit takes 20 ms. In simulated sessions the largest change of a driven
+# arm is 0.041 (1.8 N m at joint 2, when a trial begins to float), of the locked joint
+# 7 0.018. The start of torques, a step of 26 N m at joint 2, takes 12 ms while idle,
+# sooner than the pendant can activate the arm. Joint 7 is light and its lock stiff:
+# at 0.1 the delayed lock accelerates the joint instead (17 rad/s after a twist of 1.2
+# N m), at 0.3 it does not, and one false position causes 0.8 rad/s.
+MAX_TORQUE_STEP = (0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.3)
+_GENTLE_STEP = tuple(0.99 * step for step in MAX_TORQUE_STEP)  # margin for rounding
 
 
-def bounded_torque(tau: Vector, last: Vector, limits: Sequence[float]) -> Vector:
-    """Limit torque and rate of change; return [N m], shape (7,). NaN is passed through.
+def limit_torque(tau: Vector, last: Vector, limits: Sequence[float]) -> Vector:
+    """Clip the torques and their slew rate; return [N m], shape (7,). NaN passes.
 
     Args:
         tau: desired joint torques [N m], shape (7,).
@@ -125,7 +125,7 @@ def bounded_torque(tau: Vector, last: Vector, limits: Sequence[float]) -> Vector
     is_gentle = are_within(map(sub, values, previous), map(mul, _GENTLE_STEP, limits))
     if is_gentle and are_within(values, limits):
         return tau
-    rows = zip(values, previous, limits, TORQUE_STEP, strict=True)
+    rows = zip(values, previous, limits, MAX_TORQUE_STEP, strict=True)
     bounded: list[float] = []
     for desired, before, limit, share in rows:
         step = share * limit

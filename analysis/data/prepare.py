@@ -199,11 +199,11 @@ def moving_average(x: Array, width: int) -> Array:
 
 
 def foot_velocity(t: Array, position: Array) -> Array:
-    """Return the velocity of the foot [m/s] by central differences of its position.
+    """Return the velocity of the foot [m/s], the source of the slip velocity.
 
-    The recorded times are used, so a missing cycle does no harm; the two ends use
-    one-sided differences. A difference over more than three missing samples would
-    invent motion: there the velocity is NaN, so that the row is dropped.
+    Central differences of its position over the recorded times, so a missing cycle does
+    no harm; the two ends use one-sided differences. A difference over more than three
+    missing samples would invent motion: its velocity is NaN, so the row is dropped.
 
     Args:
         t: recorded time [s], shape (n,), strictly increasing, n >= 2.

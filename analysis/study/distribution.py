@@ -64,7 +64,7 @@ class Distribution(Protocol):
         """Return the log density of F_t [N] in log 1/N, shape (n,)."""
         ...
 
-    def ranked_probability(self, F_t: Array) -> Array:
+    def crps(self, F_t: Array) -> Array:
         """Return the continuous ranked probability score of F_t [N], shape (n,)."""
         ...
 
@@ -138,7 +138,7 @@ class NewTrialPrediction:
         score, slope = self._scores(F_t)
         return np.log(slope) - 0.5 * (score**2 + np.log(2.0 * np.pi))
 
-    def ranked_probability(self, F_t: Array) -> Array:
+    def crps(self, F_t: Array) -> Array:
         """Return the continuous ranked probability score of F_t [N], shape (n,)."""
         nodes, weights = _nodes()
         return expected_pinball(F_t, self.quantiles(nodes), nodes, weights)

@@ -55,9 +55,9 @@ class Prediction(NamedTuple):
         """Return the log density of every measurement F_t [N], shape (n,)."""
         return log_density(F_t, self)
 
-    def ranked_probability(self, F_t: Array) -> Array:
+    def crps(self, F_t: Array) -> Array:
         """Return the continuous ranked probability score [N] of F_t, shape (n,)."""
-        return ranked_probability(F_t, self)
+        return crps(F_t, self)
 
 
 class Score(NamedTuple):
@@ -95,7 +95,7 @@ def score(F_t: Array, prediction: Distribution) -> Score:
         coverage95=coverage(F_t, prediction, 0.95),
         variance=float(np.mean(prediction.sd**2)),
         nlpd=float(-np.mean(prediction.log_density(F_t))),
-        crps=float(np.mean(prediction.ranked_probability(F_t))),
+        crps=float(np.mean(prediction.crps(F_t))),
         coverage50=coverage(F_t, prediction, 0.50),
         coverage90=coverage(F_t, prediction, 0.90),
     )
@@ -118,7 +118,7 @@ def log_density(F_t: Array, prediction: Prediction) -> Array:
     return constant - 0.5 * (nu + 1.0) * np.log1p(z2 / nu) - np.log(scale)
 
 
-def ranked_probability(F_t: Array, prediction: Prediction) -> Array:
+def crps(F_t: Array, prediction: Prediction) -> Array:
     """Return the continuous ranked probability score [N] of every F_t, shape (n,).
 
     The integral of (distribution - step)^2: normal and Student's t in closed form

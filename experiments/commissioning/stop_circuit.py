@@ -77,7 +77,7 @@ def _await_mode(scene: Scene, mode: SafetyMode, button: str) -> bool:
     def is_seen() -> bool:
         modes = reader.read()["flags"] & SAFETY_MODE_MASK
         verdict = scene.loop_client.status.verdict
-        is_early = verdict is not None and verdict.fault is Fault.NOT_ASKED_ACTIVE
+        is_early = verdict is not None and verdict.fault is Fault.UNREQUESTED_ACTIVE
         return bool((modes == mode).any()) or (mode is SafetyMode.ACTIVE and is_early)
 
     if not _await(scene, is_seen):

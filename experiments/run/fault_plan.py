@@ -1,4 +1,4 @@
-"""Plan of the faults that a rehearsal injects, with their times."""
+"""Fault injection: plan of the faults of a rehearsal, with their times."""
 
 import re
 from collections.abc import Sequence

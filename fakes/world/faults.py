@@ -1,4 +1,4 @@
-"""Faults of the simulated arm and its bus, by the names used in a rehearsal."""
+"""Fault injection in the simulated arm and its bus, by the names of a rehearsal."""
 
 from collections.abc import Callable, Iterable
 from functools import partial

@@ -1,4 +1,4 @@
-"""Timestamps and validity of the samples of a wrist sensor."""
+"""Timestamps of a wrist sensor, synchronised to the host clock, and its validity."""
 
 import math
 

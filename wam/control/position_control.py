@@ -1,4 +1,4 @@
-"""Joint position control: springs that hold the arm, PD along a move."""
+"""Joint position control: springs that hold the arm, trajectory and PD of a move."""
 
 from dataclasses import dataclass
 
@@ -24,7 +24,7 @@ TORQUE_LIMIT = np.array([8.0, 12.0, 6.0, 6.0, 1.0, 1.0, 0.0])  # N m
 
 
 class PositionHold:
-    """Springs and dampers of joints 1 to 6.
+    """Joint impedance: springs and dampers of joints 1 to 6.
 
         tau = clip(k (q_ref - q), -limit, limit) - d qd
 
@@ -109,9 +109,9 @@ PD_TORQUE_LIMIT = np.array([25.0, 20.0, 15.0, 15.0, 5.0, 5.0, 5.0])  # N m, PD p
 
 @dataclass(frozen=True, slots=True)
 class JointMove:
-    """Straight move from `start` to `goal` [rad], shapes (7,), trapezoidal in speed.
+    """Straight trajectory from `start` to `goal` [rad], shapes (7,).
 
-    The joint with the longest travel follows the trapezoid, the others in proportion.
+    The joint with the longest travel has a trapezoidal speed, the others in proportion.
     """
 
     start: Array

@@ -1,5 +1,5 @@
 # pyright: basic, reportMissingImports=false
-"""The arm as a Pinocchio model: pose, Jacobian, gravity, mass matrix.
+"""The arm as a Pinocchio model: forward kinematics, Jacobian, gravity, mass matrix.
 
 Standard (distal) Denavit-Hartenberg: T_i = Rz(q_i) Tz(d_i) Tx(a_i) Rx(alpha_i). The
 rotation comes first, so the constant part S_i of joint i is the placement of joint

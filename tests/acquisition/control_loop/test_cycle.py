@@ -738,7 +738,7 @@ def test_of_two_verdicts_the_stricter_comes_first_and_both_remain(bench, first, 
         bench.cycle.report(fault(name))
         bench.run()
     faults = [verdict.fault for verdict in bench.cycle.status.active_verdicts]
-    assert faults == [Fault.MOTOR_STUCK, Fault.CONSOLE_SILENT]
+    assert faults == [Fault.MOTOR_STALLED, Fault.CONSOLE_SILENT]
     assert (bench.state, bench.cycle.status.number) == (ArmState.IDLE, 2)
 
 

@@ -12,13 +12,13 @@ from acquisition.control_loop.faults import (
     Action,
     Fault,
     ForceAge,
+    FrozenEncoder,
     Joint7Slip,
     JointExcess,
     LateCycles,
     ReplySilence,
     SafetySilence,
-    StillMotor,
-    StuckMotor,
+    StalledMotor,
 )
 from acquisition.control_loop.guard import GuardState, Observation, check
 from acquisition.control_loop.states import ArmState
@@ -426,8 +426,8 @@ ONE_MOTOR = replace(LIMITS, still_travel=(9.0, 9.0, 9.0, 0.02, 9.0, 9.0, 9.0))
 
 def test_a_stuck_motor_while_the_sole_moves_ends_the_session():
     _, verdict = led([(100, 0.3), (100, 0.3201)])
-    assert (verdict.fault, verdict.action) == (Fault.MOTOR_STILL, Action.IDLE)
-    assert verdict.detail == StillMotor(4, pytest.approx(20.1), pytest.approx(20.0))
+    assert (verdict.fault, verdict.action) == (Fault.ENCODER_FROZEN, Action.IDLE)
+    assert verdict.detail == FrozenEncoder(4, pytest.approx(20.1), pytest.approx(20.0))
     assert verdict.ends_session
 
 
@@ -452,7 +452,7 @@ def test_a_motor_may_rest_up_to_its_limit_of_sole_travel(motor):
     limit = LIMITS.still_travel[motor - 1]
     assert motor_at_rest(motor, 0.99 * limit) is OK
     detail = motor_at_rest(motor, 1.01 * limit).detail
-    assert detail == StillMotor(
+    assert detail == FrozenEncoder(
         motor, pytest.approx(1010.0 * limit), pytest.approx(1000.0 * limit)
     )
 
@@ -466,7 +466,7 @@ def test_a_flicker_of_one_count_is_not_motion(counts):
 def test_a_motor_that_turns_meanwhile_is_not_stuck(counts):
     steps = [(100, 0.3), (counts, 0.319), (counts, 0.3389)]
     assert led(steps)[1] is OK
-    assert led([*steps, (counts, 0.3391)])[1].fault is Fault.MOTOR_STILL
+    assert led([*steps, (counts, 0.3391)])[1].fault is Fault.ENCODER_FROZEN
 
 
 def test_a_sole_at_rest_or_returning_flags_no_motor():
@@ -513,8 +513,8 @@ def test_only_motors_1_and_7_may_rest_for_a_whole_trial():
 @pytest.mark.parametrize("motor", [1, 7])
 def test_a_move_with_a_stuck_motor_is_braked(motor):
     verdict = judge(stuck_motor=motor, is_recording=False)
-    assert (verdict.fault, verdict.action) == (Fault.MOTOR_STUCK, Action.IDLE)
-    assert verdict.detail == StuckMotor(motor)
+    assert (verdict.fault, verdict.action) == (Fault.MOTOR_STALLED, Action.IDLE)
+    assert verdict.detail == StalledMotor(motor)
     assert verdict.ends_session
 
 
@@ -615,7 +615,7 @@ IDLE = {"is_commanded": False, "is_recording": False, "state": ArmState.IDLE}
 @pytest.mark.parametrize("before", [GuardState(), ARMED])
 def test_an_arm_activated_without_a_request_is_idled(before):
     verdict = check(LIMITS, before, seen(safety=SafetyMode.ACTIVE, **IDLE))[1]
-    assert (verdict.fault, verdict.action) == (Fault.NOT_ASKED_ACTIVE, Action.IDLE)
+    assert (verdict.fault, verdict.action) == (Fault.UNREQUESTED_ACTIVE, Action.IDLE)
 
 
 @pytest.mark.parametrize("safety", set(SafetyMode) - {SafetyMode.ACTIVE})

@@ -94,7 +94,7 @@ def test_quantiles_of_equal_residuals_increase():
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("force", [0.3, 2.1, 5.0])
-def test_ranked_probability_is_its_integral(kind, force):
+def test_crps_equals_its_integral(kind, force):
     from scipy.integrate import quad
 
     law = predicted(KINDS[kind])
@@ -106,9 +106,7 @@ def test_ranked_probability_is_its_integral(kind, force):
     parts = [min(low, force), force, max(high, force)]
     exact = sum(quad(squared, a, b, limit=200)[0] for a, b in pairwise(parts))
     # the kink of the pinball loss costs a quadrature of 64 nodes up to a percent
-    assert law.ranked_probability(np.array([force]))[0] == pytest.approx(
-        exact, rel=0.01, abs=2e-3
-    )
+    assert law.crps(np.array([force]))[0] == pytest.approx(exact, rel=0.01, abs=2e-3)
 
 
 @pytest.mark.parametrize("nu", [np.inf, 4.0])

@@ -4,8 +4,8 @@ import pytest
 from analysis.study.metrics import (
     Prediction,
     coverage,
+    crps,
     log_density,
-    ranked_probability,
     score,
 )
 
@@ -35,9 +35,7 @@ def test_densities_and_ranked_scores_have_the_reference_values(vectors):
     given = Prediction(np.array(case["mean"]), np.array(case["sd"]))
     y = np.array(case["y"])
     np.testing.assert_allclose(-log_density(y, given), case["nlpd_each"], rtol=1e-12)
-    np.testing.assert_allclose(
-        ranked_probability(y, given), case["crps_each"], rtol=1e-9
-    )
+    np.testing.assert_allclose(crps(y, given), case["crps_each"], rtol=1e-9)
 
 
 def test_student_t_agrees_with_scipy_and_with_its_integrated_score():
@@ -49,14 +47,14 @@ def test_student_t_agrees_with_scipy_and_with_its_integrated_score():
     x = np.linspace(-60.0, 60.0, 120_001)
     integral = np.trapezoid((law.cdf(x) - (x >= 1.4)) ** 2, x)
     # the step falls between two points 1e-3 apart
-    assert ranked_probability(y, given)[0] == pytest.approx(integral, abs=1e-3)
+    assert crps(y, given)[0] == pytest.approx(integral, abs=1e-3)
     assert coverage(np.array([law.ppf(0.94)]), given, 0.9) == 1.0
     assert coverage(np.array([law.ppf(0.96)]), given, 0.9) == 0.0
 
 
 def test_the_crps_of_a_certain_prediction_is_its_error():
     sure = Prediction(np.array([1.0]), np.array([0.0]))
-    assert ranked_probability(np.array([3.0]), sure)[0] == pytest.approx(2.0)
+    assert crps(np.array([3.0]), sure)[0] == pytest.approx(2.0)
 
 
 def test_a_95_percent_band_covers_95_percent_of_a_normal_sample():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.control_loop.cycle import Cycle, CycleOutputs
-from acquisition.control_loop.limits import TORQUE_STEP
+from acquisition.control_loop.limits import MAX_TORQUE_STEP
 from acquisition.control_loop.loop import Loop
 from acquisition.control_loop.states import ArmState
 from tests.acquisition.control_loop.limits import guard_limits
@@ -110,7 +110,7 @@ def test_one_rejected_position_gives_no_torque_step(motor, state):
     sent = np.array(bench.torques)
     assert (np.abs(sent) <= TORQUE + ROUNDING).all()
     assert (
-        np.abs(np.diff(sent, axis=0)) <= np.array(TORQUE_STEP) * TORQUE + ROUNDING
+        np.abs(np.diff(sent, axis=0)) <= np.array(MAX_TORQUE_STEP) * TORQUE + ROUNDING
     ).all()
     assert max(bench.speeds) < SPEED_BOUND[motor]
     bench.arm.close()

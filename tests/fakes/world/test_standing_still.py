@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.control_loop.faults import Fault
-from acquisition.control_loop.limits import TORQUE_STEP
+from acquisition.control_loop.limits import MAX_TORQUE_STEP
 from acquisition.control_loop.states import ArmState
 from tests.fakes.scenes import CONSTANTS
 from tests.fakes.world.holding import SPEED, TORQUE, HoldBench
@@ -81,7 +81,7 @@ def test_a_joint_that_was_fast_is_stopped_within_bounds(joint):
     assert np.abs(q - begin).max() < STOPPING[joint]
     assert np.ptp(q[-250:], axis=0).max() < 2.0 * STILL
     steps = np.abs(np.diff(bench.sent, axis=0)).max(axis=0)
-    assert (steps <= 1.05 * np.array(TORQUE_STEP) * TORQUE).all()
+    assert (steps <= 1.05 * np.array(MAX_TORQUE_STEP) * TORQUE).all()
 
 
 @pytest.mark.parametrize("joint", [0, 1])

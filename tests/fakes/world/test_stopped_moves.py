@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition.control_loop.details import StuckMotor
+from acquisition.control_loop.details import StalledMotor
 from acquisition.control_loop.faults import FAULTS, Fault, verdict_for
 from acquisition.control_loop.states import ArmState
 from fakes.world.rig import LocalSimulation
@@ -219,7 +219,7 @@ def test_an_encoder_that_freezes_in_a_move_is_detected(friction, motor):
     move(bench)
     freeze(bench, motor)
     assert worst_speed(bench, 0.5) < FASTEST[friction]
-    assert bench.cycle.status.verdict.detail == StuckMotor(motor)
+    assert bench.cycle.status.verdict.detail == StalledMotor(motor)
     assert bench.plant.is_idle
 
 
@@ -229,7 +229,7 @@ def test_an_encoder_frozen_before_a_move_is_detected(friction, motor):
     freeze(bench, motor)
     bench.cycle.move_to((bench.plant.q + OFFSETS).tolist(), SPEED)
     assert worst_speed(bench, 2.0) < FASTEST[friction]
-    assert bench.cycle.status.verdict.fault is Fault.MOTOR_STUCK
+    assert bench.cycle.status.verdict.fault is Fault.MOTOR_STALLED
 
 
 @pytest.mark.parametrize("error", [-0.3, 0.3])
@@ -255,7 +255,7 @@ def test_joint_7_frozen_at_its_top_speed_is_braked():
     assert bench.plant.qd[6] == pytest.approx(SPEED, rel=0.1)
     freeze(bench, 7)
     assert worst_speed(bench, 0.5) < 1.0
-    assert bench.cycle.status.verdict.detail == StuckMotor(7)
+    assert bench.cycle.status.verdict.detail == StalledMotor(7)
 
 
 def test_holding_the_arm_in_a_move_brakes_it():
@@ -267,4 +267,4 @@ def test_holding_the_arm_in_a_move_brakes_it():
         bench.plant.qd[:] = 0.0
         bench.plant.q[:] = q
         bench.step()
-    assert bench.cycle.status.verdict.fault is Fault.MOTOR_STUCK
+    assert bench.cycle.status.verdict.fault is Fault.MOTOR_STALLED
