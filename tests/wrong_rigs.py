@@ -245,7 +245,7 @@ def _commission(
 
 def _is_of_other_pucks(name: str) -> bool:
     """Whether only the record of an earlier day reveals what is wrong."""
-    properties = wrong_rig(name).departure.properties if name else ()
+    properties = wrong_rig(name).deviation.properties if name else ()
     return any(what == "SN" for _, what, _ in properties)
 
 

@@ -17,7 +17,7 @@ _DEGREES = number_within(-180.0, 180.0, "degrees -180..180, e.g. 90")
 
 
 class WrongRigChoice(Action):
-    """Accepts the name of a wrong rig; `help` or an unknown name lists them.
+    """Accepts the name of a faulty rig; `help` or an unknown name lists them.
 
     The catalogue is read only if the option is given.
     """
@@ -57,15 +57,15 @@ def add_truth(parser: ArgumentParser) -> None:
         nargs=3,
         type=_DEGREES,
         metavar=("X", "Y", "Z"),
-        help="the true base is turned by so many degrees about x, then y, then z; the "
-        "program does not know, only if simulated",
+        help="rotate the base by degrees about x, then y, then z, without changing "
+        "the settings (simulation only)",
     )
     parser.add_argument(
         "--wrong",
         action=WrongRigChoice,
         default="",
         metavar="NAME",
-        help="a rig with something wrong, only if simulated; help lists them",
+        help="simulate a faulty rig (simulation only); help lists the faults",
     )
 
 

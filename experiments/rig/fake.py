@@ -112,14 +112,14 @@ class SimulatedRig:
 
 
 def wrong_rigs() -> dict[str, str]:
-    """Return defect and cause of each wrong rig of the catalogue, by name."""
+    """Return fault and cause of each faulty rig of the catalogue, by name."""
     from fakes.world.wrong_rigs import catalogue
 
-    return {name: f"{rig.wrong} ({rig.cause})" for name, rig in catalogue().items()}
+    return {name: f"{rig.fault} ({rig.cause})" for name, rig in catalogue().items()}
 
 
 def with_typing_error(settings: Settings, wrong: str) -> Settings:
-    """Return the settings of the wrong rig of that name, with its typing error.
+    """Return the settings with the typing error of a faulty rig, if it has one.
 
     Raises:
         SettingsError: there is no such rig, or rig.toml would be refused with the
@@ -127,7 +127,7 @@ def with_typing_error(settings: Settings, wrong: str) -> Settings:
     """
     from fakes.world.wrong_rigs import wrong_rig
 
-    mass = wrong_rig(wrong).departure.typed_foot_mass
+    mass = wrong_rig(wrong).deviation.typed_foot_mass
     return settings if mass is None else settings.with_foot_mass(mass)
 
 

@@ -56,7 +56,7 @@ class AtiFirmware:
     """Implements `fakes.sensor.stream.Firmware`; silent until a request."""
 
     frame_size = ati.FRAME_SIZE
-    is_checked = True  # a damaged datagram does not arrive
+    drops_damaged_frames = True  # a damaged datagram does not arrive
 
     def __init__(self, options: AtiOptions, start_ns: int) -> None:
         self.baudrate = options.baudrate

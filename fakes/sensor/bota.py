@@ -81,7 +81,7 @@ class BotaFirmware:
     """
 
     frame_size = bota.FRAME_SIZE
-    is_checked = False
+    drops_damaged_frames = False
 
     def __init__(self, options: BotaOptions, start_ns: int) -> None:
         self.baudrate = options.baudrate
@@ -129,7 +129,7 @@ class BotaFirmware:
     def frame(self, measurement: Measurement, status: int) -> bytes:
         """Return the 37 bytes of a sample."""
         status |= (
-            measurement.is_skipping
+            measurement.has_skipped
             | self.is_raw << 3
             | (measurement.saturated > 0) << 1
         )

@@ -7,7 +7,7 @@ from typing import Protocol
 from ft_sensor.reading import Wrench
 
 TimedBytes = tuple[int, bytes]  # time of sending [ns], bytes
-FULL_COUNT = 32767  # of a sensor with 16-bit counts
+FULL_SCALE = 32767  # 16-bit counts
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class Measurement:
         saturated: bit i set = axis i was clipped.
         device_us: the device's clock [us], not wrapped.
         number: counter of frames since power-on.
-        is_skipping: the previous sample could not be sent.
+        has_skipped: the previous sample could not be sent.
         temperature: [degrees Celsius].
     """
 
@@ -35,7 +35,7 @@ class Measurement:
     saturated: int
     device_us: int
     number: int
-    is_skipping: bool
+    has_skipped: bool
     temperature: float
 
 
@@ -43,16 +43,16 @@ class Firmware(Protocol):
     """Commands and frames of one vendor.
 
     Attributes:
-        baudrate: speed of its line [bit/s].
-        schedule: its sample times; None = it does not stream. A new object restarts
+        baudrate: speed of the serial line [bit/s].
+        schedule: sample times; None = not streaming. Assigning a new object restarts
             the stream.
         on_since_ns: time of power-on or of its last reset.
-        clock_rate: rate of its clock, 1 = exact.
+        clock_rate: rate of the device's clock, 1 = exact.
         frame_size: size of a frame [bytes].
-        is_checked: a frame damaged in transit does not arrive.
+        drops_damaged_frames: the transport drops damaged frames (UDP checksum).
     """
 
-    is_checked: bool
+    drops_damaged_frames: bool
     baudrate: int
     schedule: SampleSchedule | None
     on_since_ns: int
@@ -68,12 +68,12 @@ class Firmware(Protocol):
         ...
 
     def frame(self, measurement: Measurement, status: int) -> bytes:
-        """Return the bytes of a frame with `status` bits set besides its own."""
+        """Return an encoded frame; `status` bits are added to the device's own."""
         ...
 
 
 def count_of(value: float) -> int:
     """Return `value` as a 16-bit count; NaN and infinity read full scale."""
     if not math.isfinite(value):
-        return FULL_COUNT
-    return max(-FULL_COUNT, min(FULL_COUNT, round(value)))
+        return FULL_SCALE
+    return max(-FULL_SCALE, min(FULL_SCALE, round(value)))

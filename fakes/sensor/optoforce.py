@@ -58,7 +58,7 @@ class OptoForceFirmware:
     """Implements `fakes.sensor.stream.Firmware`; streams from power-on."""
 
     frame_size = optoforce.FRAME_SIZE
-    is_checked = False
+    drops_damaged_frames = False
 
     def __init__(self, options: OptoForceOptions, start_ns: int) -> None:
         self.baudrate = options.baudrate

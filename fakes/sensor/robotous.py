@@ -58,7 +58,7 @@ class RobotousFirmware:
     """
 
     frame_size = robotous.FRAME_SIZE
-    is_checked = False
+    drops_damaged_frames = False
 
     def __init__(self, options: RobotousOptions, start_ns: int) -> None:
         self.baudrate = options.baudrate

@@ -192,7 +192,7 @@ class SensorStream:
             data = damage(data, *self._fault)
             self._fault = None
         data = self.faults.carry(data)
-        if data == undamaged or not self.firmware.is_checked:
+        if data == undamaged or not self.firmware.drops_damaged_frames:
             self._send(t_ns, data)
 
     def _measurement(self, t_ns: int, wrench: Sequence[float]) -> Measurement:

@@ -15,7 +15,7 @@ from fakes.randomness import trial_generator
 from fakes.sensor.errors import SensorErrors
 from fakes.serving.puck_server import Port, PuckServer
 from fakes.serving.sensor_server import SensorLine, SensorServer
-from fakes.world.departure import RigDeviation
+from fakes.world.deviation import RigDeviation
 from fakes.world.true_rig import (
     apply_deviation,
     sensor_reading,
@@ -52,7 +52,7 @@ class HomePose:
         is_at_rest: joint 6 is on its upper stop, held there by gravity.
         friction: scale of the joint friction; None = by `has_hand`.
         seed: seed of friction and windings; None = nominal values.
-        departure: deviation of the true arm from its settings; None = none.
+        deviation: deviation of the hardware from the settings; None = none.
     """
 
     tool: Tool | None
@@ -64,7 +64,7 @@ class HomePose:
     is_at_rest: bool = False
     friction: float | None = None
     seed: int | None = None
-    departure: RigDeviation | None = None
+    deviation: RigDeviation | None = None
 
 
 def build_home_server(port: Port, pose: HomePose, clock: Clock) -> PuckServer:
@@ -75,15 +75,15 @@ def build_home_server(port: Port, pose: HomePose, clock: Clock) -> PuckServer:
     Raises:
         SettingsError: the serial line's path is in use or cannot be one.
     """
-    departure = pose.departure or RigDeviation()
+    deviation = pose.deviation or RigDeviation()
     believed, now_ns = load_constants(), clock.now_ns()
-    constants = true_constants(believed, departure)
+    constants = true_constants(believed, deviation)
     options = replace(_AIDED if pose.has_hand else _UNAIDED, seed=pose.seed)
     if pose.friction is not None:
         options = replace(options, friction=pose.friction)
-    options = true_options(options, departure)
-    tool = true_tool(pose.tool or _PLATE, departure)
-    q = _zeroing_pose(constants, departure, is_at_rest=pose.is_at_rest)
+    options = true_options(options, deviation)
+    tool = true_tool(pose.tool or _PLATE, deviation)
+    q = _zeroing_pose(constants, deviation, is_at_rest=pose.is_at_rest)
     plant = ArmPlant(constants, tool, pose.frame, q, options)
     plant.t_ns = now_ns // PERIOD_NS * PERIOD_NS
     rng = trial_generator(_SEED, "home", 0)
@@ -97,12 +97,12 @@ def build_home_server(port: Port, pose: HomePose, clock: Clock) -> PuckServer:
         safety_vers=pose.firmware[1],
         mt=constants.mt,
     )
-    source = sensor_reading(plant.sensor_load, departure)
+    source = sensor_reading(plant.sensor_load, deviation)
     network = PuckNetwork(
-        plant, true_network(network_options, departure), now_ns, Load(source, errors)
+        plant, true_network(network_options, deviation), now_ns, Load(source, errors)
     )
-    # The zero errors are in the pose in which it is zeroed, so not in the wiring.
-    apply_deviation(plant, network, replace(departure, zeros=np.zeros(7)), believed)
+    # The zero errors are part of the pose at zeroing, so not of the wiring.
+    apply_deviation(plant, network, replace(deviation, zeros=np.zeros(7)), believed)
     sensor = None
     if pose.line is not None:
         sensor = SensorServer(pose.line, source, clock)
@@ -110,13 +110,13 @@ def build_home_server(port: Port, pose: HomePose, clock: Clock) -> PuckServer:
 
 
 def _zeroing_pose(
-    constants: ArmConstants, departure: RigDeviation, *, is_at_rest: bool
+    constants: ArmConstants, deviation: RigDeviation, *, is_at_rest: bool
 ) -> Array:
     """Return the pose in which a person zeroes the arm [rad], shape (7,).
 
     The home position less the errors of the zeros, within the stops.
     """
-    q = constants.home - departure.zeros
+    q = constants.home - deviation.zeros
     if is_at_rest:
         q[_JOINT_6] = constants.q_upper[_JOINT_6]
     return np.clip(q, constants.q_lower, constants.q_upper)

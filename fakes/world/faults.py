@@ -23,9 +23,9 @@ from wam.bus.frames import (
     position_reply_id,
 )
 
-PUCK = 3  # the puck that fails alone: its joint supports little, the arm stays up
-FOREIGN_LOAD = 0.6  # of the bus, half above and half below the arm's priority
-_OTHER_NODE = 20  # of a master that does not use the host's node
+PUCK = 3  # the failing puck: its joint carries little load, so the arm stays up
+FOREIGN_LOAD = 0.6  # bus load, half above and half below the arm's priority
+_OTHER_NODE = 20  # node of a second master
 _LOW_VOLTAGE = 20.0  # below the limit of the safety module [V]
 _OTHER_IPNM = 2500  # wrong motor constant reported by PUCK
 _HOT = 72  # above OTEMP [degrees Celsius]
@@ -35,12 +35,12 @@ _USUAL = {"TEMP": 35, "ERROR": 0}
 _AFTER_THE_OTHERS_NS = 7 * FRAME_NS[3]
 _AFTER_NEXT_REQUEST_NS = 1_950_000
 _LATE_EVERY = 50  # cycles
-# Late by one cycle and by two: they are taken for the replies of the present cycle.
+# Late by one cycle and by two: mistaken for the replies of the current cycle.
 _PAST_NS, _LONG_PAST_NS = 2_000_000, 3_950_000
 _LOSING_MODE = (2, 4, 7)  # pucks
-LAST_PUCK = 7  # nothing is on the wire after its reply
+LAST_PUCK = 7  # the last to reply in a cycle
 _TWIN_NS, _TWIN_COUNTS = 50_000, 100  # delay and offset of a second puck's replies
-_LOST_SHARE = 0.01  # of the replies of each puck
+_LOST_SHARE = 0.01  # lost share of the replies of each puck
 
 
 def network_faults(network: PuckNetwork) -> dict[str, Callable[[], None]]:
@@ -132,7 +132,7 @@ def _answer_always_late(faults: BusFaults, nodes: Iterable[int], late_ns: int) -
 
 
 def _second_position(reply: bytes) -> bytes:
-    """Return a second puck's position, some millimetres of the sole away."""
+    """Return the reply of a second puck; the sole differs by some millimetres."""
     return encode_position(decode_position(reply) + _TWIN_COUNTS)
 
 
@@ -174,7 +174,7 @@ _BLOW = 10.0
 # The joint lock of 20 N m/rad deflects by 50 mrad, where it counts as slipped, at
 # 1 N m; the joint torque limit is 1.3 N m. A sudden twist would overshoot, so it ramps.
 _TWIST, _TWIST_STEP = 1.2, 0.02  # N m
-_LOAD = (0.0, 0.0, 120.0)  # on the foot, above the limit of a trial [N]
+_LOAD = (0.0, 0.0, 120.0)  # on the foot, above the force limit of a trial [N]
 _FINGER = (0.0, 0.0, 3.2)  # at the hanging sole, terrain frame [N]
 
 Later = Callable[[int, Callable[[], None]], None]  # (delay [ns], action)
@@ -240,7 +240,7 @@ class Cable(Protocol):
 
 _F_Z = 2  # index in a wrench
 CLOCK_JUMP_US = 10_000_000
-_JUMP = (1.5, 0.0, -1.5, 0.0, 0.0, 0.0)  # of the zero: too large for a tare [N, N m]
+_JUMP = (1.5, 0.0, -1.5, 0.0, 0.0, 0.0)  # zero shift, too large to tare [N, N m]
 
 
 def stream_faults(

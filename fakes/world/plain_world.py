@@ -10,7 +10,7 @@ from fakes.ground.terrain import GroundChoice, PlateParameters
 from fakes.plant.model import PlantOptions
 from fakes.plant.push import PACES
 from fakes.sensor.kinds import SensorChoice
-from fakes.world.departure import RigDeviation, draw_sound_rig
+from fakes.world.deviation import RigDeviation, draw_sound_rig
 from fakes.world.rig import FakeRig, LocalSimulation, SimulatedScene
 from fakes.world.wrong_rigs import wrong_rig
 from ft_sensor.payload import TerrainFrame
@@ -38,7 +38,7 @@ def _scene_of(fields: Mapping[str, Any]) -> SimulatedScene:
         start_q=np.array(fields["start_q"]),
         seed=fields["seed"],
         sensor=SensorChoice(**fields["sensor"]),
-        departure=deviation_from(fields.get("truth"), fields["seed"]),
+        deviation=deviation_from(fields.get("truth"), fields["seed"]),
     )
 
 
@@ -47,7 +47,7 @@ def deviation_from(truth: Mapping[str, Any] | None, seed: int) -> RigDeviation |
 
     Args:
         truth: "spread": draw a sound rig; "mount": rotations of its base about x, y, z
-            [degrees]; "wrong": name in the catalogue of wrong rigs, "" = none.
+            [degrees]; "wrong": name of a faulty rig for `--wrong`, "" = none.
         seed: seed of the sound rig.
     """
     if truth is None:
@@ -56,7 +56,7 @@ def deviation_from(truth: Mapping[str, Any] | None, seed: int) -> RigDeviation |
     mount = np.radians(np.array(truth["mount"], dtype=np.float64))
     mounted = RigDeviation(mount=mount).on(sound)
     name = truth["wrong"]
-    return wrong_rig(name).departure.on(mounted) if name else mounted
+    return wrong_rig(name).deviation.on(mounted) if name else mounted
 
 
 def simulated_rig(

@@ -24,7 +24,7 @@ from fakes.sensor.errors import SensorErrors
 from fakes.sensor.kinds import SensorChoice, make_stream
 from fakes.sensor.port import FakeSerialPort
 from fakes.truth import truth_records
-from fakes.world.departure import RigDeviation
+from fakes.world.deviation import RigDeviation
 from fakes.world.faults import (
     BodyFaults,
     Cable,
@@ -50,23 +50,23 @@ from wam.model.constants import ArmConstants, Array
 from wam.model.start_pose import lowered_to
 from wam.model.tool import Tool
 
-_START_HEIGHT = 0.05  # of the waiting foot above the far end [m]
-LAG_NS = 600_000  # above the allowed lateness of a cycle
+_START_HEIGHT = 0.05  # of the foot above the far end before a trial [m]
+LAG_NS = 600_000  # exceeds the allowed lateness of a cycle
 _ANY_SENSOR = SensorChoice()
 
 
 @dataclass(frozen=True, slots=True)
 class SimulatedScene:
-    """The simulated set-up: terrain, ground, container, arm and sensor.
+    """Simulated set-up: terrain, ground, container, arm and sensor.
 
     Attributes:
-        terrain: its name, e.g. "S10".
+        terrain: name of the terrain, e.g. "S10".
         ground: contents of the container, and the foot.
         frame: location of the container.
         start_q: joint positions with the foot at the far end [rad], shape (7,).
         seed: seed of all random quantities.
         sensor: the wrist sensor of the arm.
-        departure: deviation of the true rig from its settings; None = none.
+        deviation: deviation of the true rig from its settings; None = none.
     """
 
     terrain: str
@@ -75,7 +75,7 @@ class SimulatedScene:
     start_q: Array
     seed: int
     sensor: SensorChoice = _ANY_SENSOR
-    departure: RigDeviation | None = None
+    deviation: RigDeviation | None = None
 
 
 def solve_start(model: ArmModel, frame: TerrainFrame, q: Array, height: float) -> Array:
@@ -105,15 +105,15 @@ class FakeRig:
         self._clock = clock
         model = ArmModel(constants, tool)
         q = solve_start(model, scene.frame, scene.start_q, _START_HEIGHT)
-        believed, departure = constants, scene.departure
+        believed, deviation = constants, scene.deviation
         network = network or NetworkOptions()
-        if departure is not None:
-            constants = true_constants(constants, departure)
-            tool = true_tool(tool, departure)
-            options = true_options(options or PlantOptions(), departure)
-            network = true_network(network, departure)
-            scene = replace(scene, frame=true_frame(scene.frame, departure))
-            q = true_start(q, departure)
+        if deviation is not None:
+            constants = true_constants(constants, deviation)
+            tool = true_tool(tool, deviation)
+            options = true_options(options or PlantOptions(), deviation)
+            network = true_network(network, deviation)
+            scene = replace(scene, frame=true_frame(scene.frame, deviation))
+            q = true_start(q, deviation)
         self.scene = scene
         self.plant = ArmPlant(constants, tool, scene.frame, q, options)
         self.plant.t_ns = clock.now_ns() // PERIOD_NS * PERIOD_NS
@@ -128,12 +128,12 @@ class FakeRig:
         )
         self.errors = SensorErrors(self.random.sensor, *kind)
         source = self.plant.sensor_load
-        if departure is not None:
-            source = sensor_reading(source, departure)
+        if deviation is not None:
+            source = sensor_reading(source, deviation)
         load = Load(source, self.errors)
         self.network = PuckNetwork(self.plant, network_options, clock.now_ns(), load)
-        if departure is not None:
-            apply_deviation(self.plant, self.network, departure, believed)
+        if deviation is not None:
+            apply_deviation(self.plant, self.network, deviation, believed)
         self._body = BodyFaults(self.plant, self.network.schedule.after)
         self.bus = FakeCanBus(self.network, clock)
         self.stream = make_stream(scene.sensor, source, self.errors, clock.now_ns())
@@ -175,7 +175,7 @@ class FakeRig:
         return actions
 
     def clear_faults(self) -> None:
-        """End every fault that can be ended without the arm."""
+        """Clear every fault that needs no action at the arm."""
         clear_stream_faults(self.stream)
         if self._cable is not None:
             self._cable.plug_in()
@@ -189,14 +189,14 @@ class FakeRig:
             self._clock.lag_ns = lag_ns
 
     def _unplug(self) -> None:
-        """Unplug the sensor's cable; a port not open yet will receive nothing."""
+        """Unplug the sensor's cable; silence the sensor if its port is not open."""
         if self._cable is not None:
             self._cable.unplug()
         else:
             self.stream.go_silent()
 
     def rake(self, trial: int) -> None:
-        """Rake the bed for `trial`: ground and hand are drawn again.
+        """Rake the bed for `trial`: draw new ground and hand parameters.
 
         The sensor's errors continue, with the random numbers of the trial.
         """
@@ -236,7 +236,7 @@ class LocalSimulation:
 
     @property
     def is_hand_done(self) -> bool:
-        """Whether the hand has completed its last order."""
+        """Whether the hand has completed its last command."""
         return self.rig.plant.hand.is_done
 
     def pose(self, q: Sequence[float], seconds: float) -> None:
@@ -311,7 +311,7 @@ class LocalSimulation:
         self._faults[fault]()
 
     def clear_faults(self) -> None:
-        """End every fault that can be ended without the arm."""
+        """Clear every fault that needs no action at the arm."""
         self.rig.clear_faults()
 
     def take_truth(self) -> Record:
@@ -321,7 +321,7 @@ class LocalSimulation:
     def parameters(self) -> dict[str, str]:
         """Return the true parameters of the ground, and the dynamics library, as text.
 
-        The library's name is kept for readers of older files, which may name others.
+        The library is stated because older files may name another one.
         """
         ground = {name: f"{v:.9g}" for name, v in self.rig.ground.truth().items()}
         effects = self.rig.scene.ground.effects

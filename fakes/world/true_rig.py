@@ -1,4 +1,4 @@
-"""Application of a rig's deviations to arm, sensor, pucks and ground."""
+"""Apply the deviations of a rig to arm, sensor, pucks and container."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from fakes.pucks.network import PuckNetwork
 from fakes.pucks.options import NetworkOptions
 from fakes.sensor.mounting import MountedSensor
 from fakes.sensor.stream import Source
-from fakes.world.departure import BusDefects, RigDeviation, rotation
+from fakes.world.deviation import BusDefects, RigDeviation, rotation
 from ft_sensor.payload import TerrainFrame
 from wam.bus.frames import MOTOR_NODES, Payload, position_reply_id, property_reply_id
 from wam.model.constants import ArmConstants, Array, Body
@@ -22,7 +22,7 @@ _TWIN_NS = 150_000  # delay of the second of two nodes with one number
 
 
 def constants_around_home(constants: ArmConstants) -> ArmConstants:
-    """Return the arm with its stops moved out to home, which lies beyond two of them.
+    """Return the arm with two stops moved out to home, which lies beyond them.
 
     Otherwise the springs of the simulated stops would throw the arm off.
     """
@@ -33,46 +33,46 @@ def constants_around_home(constants: ArmConstants) -> ArmConstants:
     )
 
 
-def true_constants(believed: ArmConstants, departure: RigDeviation) -> ArmConstants:
-    """Return the true arm: stops, gear ratios, masses of its links."""
+def true_constants(believed: ArmConstants, deviation: RigDeviation) -> ArmConstants:
+    """Return the arm with its true stops, gear ratios and link masses."""
     arm = constants_around_home(believed)
-    pairs = zip(arm.links, departure.links.tolist(), strict=True)
+    pairs = zip(arm.links, deviation.links.tolist(), strict=True)
     return replace(
         arm,
-        q_lower=arm.q_lower + departure.stops[0],
-        q_upper=arm.q_upper + departure.stops[1],
-        j2mp=arm.j2mp * departure.ratios,
+        q_lower=arm.q_lower + deviation.stops[0],
+        q_upper=arm.q_upper + deviation.stops[1],
+        j2mp=arm.j2mp * deviation.ratios,
         links=tuple(replace(link, mass=link.mass + extra) for link, extra in pairs),
     )
 
 
-def true_tool(believed: Tool, departure: RigDeviation) -> Tool:
-    """Return the true foot."""
-    foot, share = believed.foot, departure.foot_mass
-    centre = foot.com + departure.foot_centre
+def true_tool(believed: Tool, deviation: RigDeviation) -> Tool:
+    """Return the tool with its true foot and sole."""
+    foot, share = believed.foot, deviation.foot_mass
+    centre = foot.com + deviation.foot_centre
     body = Body(share * foot.mass, centre, share * foot.inertia)
-    return replace(believed, foot=body, sole=believed.sole + departure.sole)
+    return replace(believed, foot=body, sole=believed.sole + deviation.sole)
 
 
-def true_options(believed: PlantOptions, departure: RigDeviation) -> PlantOptions:
-    """Return the true friction and direction of gravity."""
-    down: list[float] = (rotation(departure.mount.tolist()).T @ _DOWN).tolist()
+def true_options(believed: PlantOptions, deviation: RigDeviation) -> PlantOptions:
+    """Return the options with the true friction and direction of gravity."""
+    down: list[float] = (rotation(deviation.mount.tolist()).T @ _DOWN).tolist()
     x, y, z = down
-    friction = departure.friction * believed.friction
+    friction = deviation.friction * believed.friction
     return replace(believed, friction=friction, down=(x, y, z))
 
 
-def true_network(believed: NetworkOptions, departure: RigDeviation) -> NetworkOptions:
-    """Return the true network: firmware of its pucks."""
+def true_network(believed: NetworkOptions, deviation: RigDeviation) -> NetworkOptions:
+    """Return the network with the true firmware of its pucks."""
     vers = list(believed.vers)
-    for node, version in departure.versions:
+    for node, version in deviation.versions:
         vers[node - 1] = version
     return replace(believed, vers=tuple(vers))
 
 
-def true_frame(believed: TerrainFrame, departure: RigDeviation) -> TerrainFrame:
+def true_frame(believed: TerrainFrame, deviation: RigDeviation) -> TerrainFrame:
     """Return the true location of the container in the rotated base frame."""
-    place, yaw = departure.place, float(departure.mount[2])
+    place, yaw = deviation.place, float(deviation.mount[2])
     shifted = np.array(believed.far_end) + place.far_end
     x, y, z = (rotation((0.0, 0.0, yaw)).T @ shifted).tolist()
     return TerrainFrame(
@@ -83,59 +83,59 @@ def true_frame(believed: TerrainFrame, departure: RigDeviation) -> TerrainFrame:
     )
 
 
-def true_start(q: Array, departure: RigDeviation) -> Array:
+def true_start(q: Array, deviation: RigDeviation) -> Array:
     """Return the true start pose at the container [rad], shape (7,)."""
     rotated = q.copy()
-    rotated[0] -= departure.mount[2]
+    rotated[0] -= deviation.mount[2]
     return rotated
 
 
-def sensor_reading(source: Source, departure: RigDeviation) -> Source:
+def sensor_reading(source: Source, deviation: RigDeviation) -> Source:
     """Return the reading of the wrist sensor under the load `source`."""
-    late_ns = round(1e9 * departure.force_late)
-    if not late_ns and (departure.shown == np.eye(6)).all():
+    late_ns = round(1e9 * deviation.force_late)
+    if not late_ns and (deviation.shown == np.eye(6)).all():
         return source
-    return MountedSensor(source, departure.shown, late_ns)
+    return MountedSensor(source, deviation.shown, late_ns)
 
 
 def apply_deviation(
     plant: ArmPlant,
     network: PuckNetwork,
-    departure: RigDeviation,
+    deviation: RigDeviation,
     believed: ArmConstants,
 ) -> None:
     """Apply the deviations of cables, pucks, safety module and bus to a rig at rest."""
-    plant.wiring = wiring_of(plant, departure, believed)
-    if departure.cable.any():
-        plant.lay_cable(departure.cable.tolist())
-    for node, name, value in departure.properties:
+    plant.wiring = wiring_of(plant, deviation, believed)
+    if deviation.cable.any():
+        plant.lay_cable(deviation.cable.tolist())
+    for node, name, value in deviation.properties:
         network.set_property(node, name, value)
-    _break_module(network, departure)
-    _break_bus(network, departure.bus)
+    _break_module(network, deviation)
+    _break_bus(network, deviation.bus)
 
 
 def wiring_of(
-    plant: ArmPlant, departure: RigDeviation, believed: ArmConstants
+    plant: ArmPlant, deviation: RigDeviation, believed: ArmConstants
 ) -> Wiring | None:
-    """Return the wiring between pucks and motors; None = as assumed."""
+    """Return the true wiring between pucks and motors; None = nominal."""
     per_radian = np.array(believed.cts) / (2.0 * np.pi)
-    true_home = per_radian * (believed.j2mp * departure.ratios @ believed.home)
+    true_home = per_radian * (believed.j2mp * deviation.ratios @ believed.home)
     home = per_radian * (believed.j2mp @ believed.home)
-    shift = per_radian * (believed.j2mp @ departure.zeros) + home - true_home
-    has_true_torques = (departure.torque == np.eye(7)).all()
-    has_true_counts = (departure.counts == np.eye(7)).all() and not shift.any()
-    torn = departure.torn
+    shift = per_radian * (believed.j2mp @ deviation.zeros) + home - true_home
+    has_true_torques = (deviation.torque == np.eye(7)).all()
+    has_true_counts = (deviation.counts == np.eye(7)).all() and not shift.any()
+    torn = deviation.torn
     if has_true_torques and has_true_counts and not torn:
         return None
-    wiring = Wiring(departure.torque, departure.counts, true_home, shift=shift)
+    wiring = Wiring(deviation.torque, deviation.counts, true_home, shift=shift)
     if not torn:
         return wiring
     torn_at = float(wiring.reported_counts(np.array(plant.counts()))[torn - 1])
     return replace(wiring, torn=torn, torn_at=torn_at)
 
 
-def _break_module(network: PuckNetwork, departure: RigDeviation) -> None:
-    module = departure.module
+def _break_module(network: PuckNetwork, deviation: RigDeviation) -> None:
+    module = deviation.module
     for limit, factor in module.limits:
         network.distort_limit(limit, factor)
     if module.dead_button is not None:
@@ -163,7 +163,7 @@ def _break_bus(network: PuckNetwork, bus: BusDefects) -> None:
 
 
 def _twin_reply(data: Payload) -> bytes:
-    """Return another device's reply in place of `data`, with one bit changed."""
+    """Return the reply `data` of a second device, with one bit changed."""
     last = len(data) - 1 if len(data) == _POSITION else 2
     return bytes(b ^ 1 if i == last else b for i, b in enumerate(bytes(data)))
 

@@ -84,7 +84,7 @@ class Make:
     has_clock: bool
     quiet_start: dict[str, Any]
     running_start: dict[str, Any]
-    is_checked: bool = False  # the network drops damaged packets
+    drops_damaged_frames: bool = False  # the network drops damaged packets
 
 
 MAKES = {
@@ -133,7 +133,7 @@ MAKES = {
         True,
         {},
         {"is_running": True},
-        is_checked=True,
+        drops_damaged_frames=True,
     ),
 }
 

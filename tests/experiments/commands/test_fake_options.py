@@ -123,26 +123,26 @@ def test_an_unknown_sensor_is_refused_with_the_known_kinds(tmp_path):
 def test_without_options_the_arm_is_nominal(serve):
     pose = serve()
     assert (pose.is_at_rest, pose.friction, pose.seed) == (False, None, None)
-    assert pose.departure is None
+    assert pose.deviation is None
 
 
 def test_pose_mount_and_friction_can_be_chosen(serve):
     pose = serve("--pose", "rest", "--mount", "90", "0", "-5", "--friction", "0.7")
     assert (pose.is_at_rest, pose.friction) == (True, 0.7)
-    assert pose.departure.mount == pytest.approx([1.5708, 0.0, -0.0873], abs=1e-4)
-    assert (pose.departure.zeros == 0.0).all()
+    assert pose.deviation.mount == pytest.approx([1.5708, 0.0, -0.0873], abs=1e-4)
+    assert (pose.deviation.zeros == 0.0).all()
 
 
 def test_a_seed_draws_a_reproducible_arm(serve):
-    one, two, again = (serve("--seed", n).departure for n in ("1", "2", "1"))
+    one, two, again = (serve("--seed", n).deviation for n in ("1", "2", "1"))
     assert (one.zeros == again.zeros).all()
     assert (one.zeros != two.zeros).all()
 
 
 def test_a_wrong_arm_is_drawn_with_its_error(serve):
-    departure = serve("--wrong", "motor-3-reversed").departure
-    assert departure.torque[2, 2] == -1.0
-    assert departure.zeros.any()
+    deviation = serve("--wrong", "motor-3-reversed").deviation
+    assert deviation.torque[2, 2] == -1.0
+    assert deviation.zeros.any()
 
 
 @pytest.mark.parametrize("command", ["fake", "run", "check", "calibrate", "rehearse"])

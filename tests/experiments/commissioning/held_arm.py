@@ -1,6 +1,6 @@
 """Recordings of C5 to C7 and C14 of an arm held still in poses, without the loop.
 
-Zeros, mount, foot, cable and axes are those of a departure; the readings are those of
+Zeros, mount, foot, cable and axes are those of a deviation; the readings are those of
 the simulated sensor with all its errors, in the order and time of the steps.
 """
 
@@ -16,7 +16,7 @@ from experiments.commissioning.weights import AVERAGE, HUNG, HUNG_AT, POSES, SET
 from fakes.plant.gauges import WristGauges
 from fakes.randomness import trial_generator
 from fakes.sensor.errors import SensorErrors
-from fakes.world.departure import RigDeviation, draw_sound_rig, rotation
+from fakes.world.deviation import RigDeviation, draw_sound_rig, rotation
 from fakes.world.true_rig import constants_around_home, true_constants, true_tool
 from fakes.world.wrong_rigs import wrong_rig
 from ft_sensor.payload import payload_of
@@ -45,22 +45,22 @@ class HeldArm:
                 drift and noise.
         """
         sound = draw_sound_rig(seed)
-        self.departure: RigDeviation = (
-            wrong_rig(wrong).departure.on(sound) if wrong else sound
+        self.deviation: RigDeviation = (
+            wrong_rig(wrong).deviation.on(sound) if wrong else sound
         )
         self._believed = load_constants()
-        self._constants = true_constants(self._believed, self.departure)
-        typed = self.departure.typed_foot_mass
+        self._constants = true_constants(self._believed, self.deviation)
+        typed = self.deviation.typed_foot_mass
         foot = tool.foot if typed is None else replace(tool.foot, mass=typed)
         self._tool = replace(tool, foot=foot)
-        true = true_tool(tool, self.departure)
+        true = true_tool(tool, self.deviation)
         self.true_tool = true
         self._model = ArmModel(self._constants, true)
-        down = rotation(self.departure.mount.tolist()).T @ np.array([0.0, 0.0, -1.0])
+        down = rotation(self.deviation.mount.tolist()).T @ np.array([0.0, 0.0, -1.0])
         self._down: Array = down.astype(np.float64)
         self._gauges = WristGauges(true, -self._down, 0.002)
-        if self.departure.cable.any():
-            self._gauges.cable = self.departure.cable
+        if self.deviation.cable.any():
+            self._gauges.cable = self.deviation.cable
         random = trial_generator(seed, "held", another_day)
         self._errors = SensorErrors(random.spawn(1)[0])
         self._random = random
@@ -72,9 +72,9 @@ class HeldArm:
     def reported(self, q: Array) -> Array:
         """Reported positions [rad], shape (7,), of joints that are truly at `q`."""
         home, ratios = self._constants.home, self._constants.j2mp
-        turned = self.departure.counts @ (ratios @ (q - home))
+        turned = self.deviation.counts @ (ratios @ (q - home))
         there = np.linalg.solve(self._believed.j2mp, turned)
-        return there + self._believed.home + self.departure.zeros
+        return there + self._believed.home + self.deviation.zeros
 
     def stops(self) -> Values:
         """Recording of C5."""
@@ -158,5 +158,5 @@ class HeldArm:
         force = self._hung * GRAVITY * self._down + self._pushed
         turn = self._model.plate_pose(self._q)[1]
         self._gauges.end_cycle(turn, [*force.tolist(), 0.0, 0.0, 0.0], [0.0] * 6)
-        shown = self.departure.shown @ np.array(self._gauges.load())
+        shown = self.deviation.shown @ np.array(self._gauges.load())
         return np.array(self._errors.apply(self._t_ns, shown.tolist()))

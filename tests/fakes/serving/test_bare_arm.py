@@ -1,4 +1,4 @@
-"""A program with the protocol and the weight of the arm moves a served arm."""
+"""A client that knows only CAN protocol and gravity model moves a served arm."""
 
 from contextlib import closing
 
@@ -22,16 +22,16 @@ from wam.model.arm_model import ArmModel
 
 WANTED = (0.2, 0.2, 0.2, -0.2, 0.0, 0.0, 0.0)
 TARGET = [a + b for a, b in zip(HOME_Q, WANTED, strict=True)]
-MOVE = 1.5  # s
-ARRIVED = 5e-3  # rad
+MOVE_SECONDS = 1.5
+POSITION_TOLERANCE = 5e-3  # rad
 
 
 class ServedArm:
-    """An arm served on a socket, on stepped time: a stall takes no simulated time."""
+    """An arm served on a socket in stepped time: stalls cost no simulated time."""
 
-    def __init__(self, folder, *, tool=None, has_hand=False, **found):
+    def __init__(self, folder, *, tool=None, has_hand=False, **pose_options):
         self.clock = LimitedClock()
-        pose = HomePose(tool, FRAME, None, True, has_hand, **found)
+        pose = HomePose(tool, FRAME, None, True, has_hand, **pose_options)
         self.server = build_home_server(SocketHub(folder / "bus"), pose, self.clock)
         self.bus = SocketBus(str(folder / "bus"))
         self.client = StrictClient(self.bus, self.rest, has_sensor=tool is not None)
@@ -69,8 +69,8 @@ def serve(tmp_path):
 def test_a_four_joint_arm_reaches_its_goal_under_vendor_control(serve):
     arm = serve()
     arm.activate()
-    found = arm.client.move(WANTED, MOVE)
-    assert found[:4] == pytest.approx(TARGET[:4], abs=ARRIVED)
+    q = arm.client.move(WANTED, MOVE_SECONDS)
+    assert q[:4] == pytest.approx(TARGET[:4], abs=POSITION_TOLERANCE)
     assert arm.server.state == "active"
     arm.client.finish()
 
@@ -79,17 +79,17 @@ def test_a_four_joint_arm_reaches_its_goal_under_vendor_control(serve):
 def test_a_person_carrying_the_foot_blocks_the_arm(serve):
     arm = serve(tool=TOOL, has_hand=True)
     arm.activate()
-    found = arm.client.move(WANTED, MOVE)
-    assert np.abs(np.subtract(found, TARGET)[:4]).max() > ARRIVED
+    q = arm.client.move(WANTED, MOVE_SECONDS)
+    assert np.abs(np.subtract(q, TARGET)[:4]).max() > POSITION_TOLERANCE
 
 
 def test_an_unsupported_bare_arm_falls(serve):
     arm = serve()
     arm.activate()
-    held = arm.client.move(WANTED, MOVE)
-    arm.client.run(cycles=100)  # of zero torque
-    found = arm.client.read_joints()
-    assert np.abs(np.subtract(found, held)).max() > 0.02
+    start = arm.client.move(WANTED, MOVE_SECONDS)
+    arm.client.run(cycles=100)  # sends zero torque
+    q = arm.client.read_joints()
+    assert np.abs(np.subtract(q, start)).max() > 0.02
 
 
 def test_a_bare_arm_rests_at_home_until_it_is_activated(serve):
@@ -102,11 +102,11 @@ def test_a_bare_arm_rests_at_home_until_it_is_activated(serve):
 def test_a_bare_arm_that_was_active_sinks_when_it_is_idle_again(serve):
     arm = serve()
     arm.activate()
-    held = arm.client.move(WANTED, MOVE)
+    start = arm.client.move(WANTED, MOVE_SECONDS)
     arm.server.press("idle")
     arm.client.run(cycles=250)
-    found = arm.client.read_joints()
-    assert np.abs(np.subtract(found, held)).max() > 0.02
+    q = arm.client.read_joints()
+    assert np.abs(np.subtract(q, start)).max() > 0.02
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -117,8 +117,8 @@ def test_gravity_torques_agree_with_the_vendor(seed):
     assert holding_torques(q.tolist()) == pytest.approx(expected, abs=0.01)
 
 
-def test_gears_and_units_agree_with_the_vendor():
+def test_gear_ratios_and_torque_units_agree_with_the_vendor():
     assert joints(HOME) == pytest.approx(HOME_Q, abs=1e-3)
-    # The example of the protocol's description, floored.
+    # Example of the protocol specification, rounded down.
     units = motor_units([1.0, -15.0, 2.0, 5.0, 0.3, -0.2, 0.05])
     assert units == [-65, -878, 556, -750, 167, 33, -59]

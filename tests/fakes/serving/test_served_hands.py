@@ -5,7 +5,7 @@ import pytest
 
 from experiments.operator.pendant import parse_order
 from fakes.plant.model import PlantOptions
-from fakes.world.departure import RigDeviation, draw_sound_rig
+from fakes.world.deviation import RigDeviation, draw_sound_rig
 from fakes.world.true_rig import true_options
 from fakes.world.wrong_rigs import wrong_rig
 from tests.fakes.scenes import CONSTANTS, MODEL, TOOL
@@ -68,13 +68,13 @@ def load(arm):
 
 @pytest.mark.parametrize("mount", [(0.0, 0.0, 0.0), (90.0, 0.0, 0.0)])
 def test_a_hung_weight_pulls_vertically(serve, mount):
-    departure = RigDeviation(mount=np.radians(mount))
-    arm = serve(has_hand=True, departure=departure)
+    deviation = RigDeviation(mount=np.radians(mount))
+    arm = serve(has_hand=True, deviation=deviation)
     order(arm, "pose 0 -1.8 0 2.9 0 0.8 0 1", 1.4)
     free, _ = load(arm)
     order(arm, "hang 2", 0.4)
     hung, rotation = load(arm)
-    down = np.array(true_options(PlantOptions(), departure).down)
+    down = np.array(true_options(PlantOptions(), deviation).down)
     assert rotation @ (hung - free)[:3] == pytest.approx(19.62 * down, abs=0.1)
     order(arm, "unhang", 0.4)
     assert load(arm)[0] == pytest.approx(free, abs=0.05)
@@ -82,7 +82,7 @@ def test_a_hung_weight_pulls_vertically(serve, mount):
 
 def test_a_sound_arm_is_zeroed_despite_offset_zeros(serve):
     sound = draw_sound_rig(2)
-    arm = serve(has_hand=True, departure=sound)
+    arm = serve(has_hand=True, deviation=sound)
     wanted = np.array([0.3, -1.8, 0.1, 2.9, 0.2, 0.8, 0.1])
     order(arm, "pose " + " ".join(map(str, wanted)) + " 1", 1.5)
     off = np.array(arm.client.read_joints()) - wanted
@@ -91,8 +91,8 @@ def test_a_sound_arm_is_zeroed_despite_offset_zeros(serve):
 
 
 def test_a_wrong_rig_is_served_with_its_deviation(serve):
-    departure = wrong_rig("encoder-4-reversed").departure
-    arm = serve(has_hand=True, departure=departure)
+    deviation = wrong_rig("encoder-4-reversed").deviation
+    arm = serve(has_hand=True, deviation=deviation)
     order(arm, "pose 0 -1.8 0 2.9 0 0.8 0 1", 1.4)
     found = arm.client.read_joints()
     assert found[3] - HOME_Q[3] == pytest.approx(HOME_Q[3] - 2.9, abs=0.01)

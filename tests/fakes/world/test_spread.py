@@ -1,4 +1,4 @@
-"""Sound rigs differ from each other in their stated properties."""
+"""Sound rigs differ by seed in the stated properties."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ import pytest
 from fakes.clock import SteppedClock
 from fakes.ground.terrain import GroundChoice
 from fakes.plant.model import PlantOptions
-from fakes.world.departure import (
+from fakes.world.deviation import (
     AXES,
     CABLE,
     CENTRE,
@@ -54,7 +54,7 @@ def test_sound_rigs_spread_as_stated(quantity, scale):
     assert abs(np.mean(values)) < 0.2 * scale
 
 
-def test_spread_scales_agree_with_the_plan():
+def test_the_spread_has_the_documented_scales():
     degrees = np.degrees([ZEROS, STOPS, TILT, AXES])
     assert degrees == pytest.approx([0.3, 0.7, 0.3, 0.5])
     assert (GAINS, MASS, CENTRE, CABLE) == (0.005, 0.005, 1e-3, 0.08)
@@ -69,8 +69,8 @@ def test_only_stated_properties_differ():
         assert vars_of(rig)[same] == vars_of(plain)[same]
 
 
-def vars_of(departure):
-    return {name: getattr(departure, name) for name in departure.__slots__}
+def vars_of(deviation):
+    return {name: getattr(deviation, name) for name in deviation.__slots__}
 
 
 def test_the_same_seed_is_the_same_rig():
@@ -80,23 +80,23 @@ def test_the_same_seed_is_the_same_rig():
     assert (again.zeros != DRAWN[8].zeros).all()
 
 
-def spread_rig(departure):
+def spread_rig(deviation):
     scene = SimulatedScene("S0", GroundChoice("small", "tread"), FRAME, START_Q, 5)
-    scene = replace(scene, departure=departure)
+    scene = replace(scene, deviation=deviation)
     clock = SteppedClock()
     rig = FakeRig(scene, CONSTANTS, TOOL, clock)
     clock.attach(rig)
     return rig
 
 
-def test_a_rig_without_departures_is_nominal():
+def test_a_rig_without_deviations_is_nominal():
     rig, _ = make_rig(5)
     assert rig.plant.wiring is None
     assert (rig.plant.ends.lower == CONSTANTS.q_lower).all()
     rig.bus.shutdown()
 
 
-def test_ground_hand_and_friction_of_a_seed_stay_when_it_is_spread():
+def test_the_spread_changes_neither_ground_nor_hand_nor_friction():
     plain, _ = make_rig(5)
     spread = spread_rig(draw_sound_rig(5))
     assert spread.ground.truth() == plain.ground.truth()
@@ -121,7 +121,7 @@ def test_zeros_offset_positions_and_stops_have_their_own_offset():
     rig.bus.shutdown()
 
 
-def test_the_truth_of_a_rig_is_consistent():
+def test_two_deviations_combine():
     first = RigDeviation(zeros=np.full(7, 0.1), foot_mass=1.1, friction=2.0)
     other = RigDeviation(zeros=np.full(7, 0.2), foot_mass=0.5, torn=2)
     both = other.on(first)
@@ -129,21 +129,21 @@ def test_the_truth_of_a_rig_is_consistent():
     assert (both.foot_mass, both.friction, both.torn) == (0.55, 2.0, 2)
 
 
-def test_a_base_turned_about_y_changes_the_gravity_direction():
+def test_a_base_rotated_about_y_changes_the_gravity_direction():
     turned = RigDeviation(mount=np.radians([0.0, 90.0, 0.0]))
     down = true_options(PlantOptions(), turned).down
     # The z axis of the base lies along the true x: down is its own -z turned back.
     assert down == pytest.approx((1.0, 0.0, 0.0), abs=1e-12)
 
 
-def test_a_turned_sensor_reads_a_turned_load():
+def test_a_rotated_sensor_reads_a_rotated_load():
     shown = rotated_axes([0.0, 0.0, np.pi / 2]) @ [1.0, 0.0, 3.0, 0.0, 2.0, 0.0]
     assert shown == pytest.approx([0.0, -1.0, 3.0, 2.0, 0.0, 0.0], abs=1e-12)
 
 
 def test_foot_and_links_have_their_stated_mass():
-    departure = RigDeviation(foot_mass=2.0, links=np.array([0.0, 0, 1, 0, 0, 0, 0]))
-    assert true_tool(TOOL, departure).foot.mass == 2.0 * TOOL.foot.mass
-    links = true_constants(CONSTANTS, departure).links
+    deviation = RigDeviation(foot_mass=2.0, links=np.array([0.0, 0, 1, 0, 0, 0, 0]))
+    assert true_tool(TOOL, deviation).foot.mass == 2.0 * TOOL.foot.mass
+    links = true_constants(CONSTANTS, deviation).links
     more = [a.mass - b.mass for a, b in zip(links, CONSTANTS.links, strict=True)]
     assert more == pytest.approx([0, 0, 1, 0, 0, 0, 0])

@@ -1,4 +1,4 @@
-"""Each wrong rig of the catalogue differs from the sound one as its name states."""
+"""Each faulty rig of the catalogue deviates from the sound one as described."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from experiments.settings.load import load_settings
 from fakes.clock import SteppedClock
 from fakes.ground.terrain import GroundChoice
 from fakes.plant.plant import ArmPlant
-from fakes.world.departure import RigDeviation
+from fakes.world.deviation import RigDeviation
 from fakes.world.rig import FakeRig, SimulatedScene
 from fakes.world.true_rig import sensor_reading, true_constants, true_frame, true_tool
 from fakes.world.wrong_rigs import catalogue, wrong_rig
@@ -42,9 +42,9 @@ def build():
 
     def start(name):
         scene = SimulatedScene("S0", GroundChoice("small", "tread"), FRAME, START_Q, 1)
-        departure = wrong_rig(name).departure if name else RigDeviation()
+        deviation = wrong_rig(name).deviation if name else RigDeviation()
         clock = SteppedClock()
-        rig = FakeRig(replace(scene, departure=departure), CONSTANTS, TOOL, clock)
+        rig = FakeRig(replace(scene, deviation=deviation), CONSTANTS, TOOL, clock)
         clock.attach(rig)
         built.append(rig)
         return rig
@@ -54,7 +54,7 @@ def build():
         rig.bus.shutdown()
 
 
-def say(rig, can_id, data, wait_ns=MS):
+def exchange(rig, can_id, data, wait_ns=MS):
     """Send a frame to the network; return (time, id, data) of the replies."""
     network = rig.network
     now_ns = network.schedule.now_ns
@@ -70,30 +70,30 @@ def get(rig, node, name, device=Device.MOTOR):
     data = encode_get(property_number(device, name, 200))
     return [
         decode_reply(data).value
-        for _, reply, data in say(rig, node, data)
+        for _, reply, data in exchange(rig, node, data)
         if reply == property_reply_id(node)
     ]
 
 
-def ask(rig, wait_ns=MS):
+def request_positions(rig, wait_ns=MS):
     """Request positions; return (time, node, counts) of the replies."""
     nodes = {position_reply_id(node): node for node in MOTOR_NODES}
     return [
         (t_ns, nodes[reply], decode_position(data))
-        for t_ns, reply, data in say(rig, 0x404, b"\x30", wait_ns)
+        for t_ns, reply, data in exchange(rig, 0x404, b"\x30", wait_ns)
         if reply in nodes
     ]
 
 
-def believed(plant: ArmPlant):
+def computed_joints(plant: ArmPlant):
     """Return the joint positions that a program computes from the counts [rad]."""
     return np.linalg.solve(CONSTANTS.j2mp, TURNS * np.array(plant.counts()))
 
 
 def test_catalogue_names_are_unique_and_every_rig_is_described():
     rigs = catalogue()
-    assert all(rig.wrong and rig.cause for rig in rigs.values())
-    assert len({rig.wrong for rig in rigs.values()}) == len(rigs)
+    assert all(rig.fault and rig.cause for rig in rigs.values())
+    assert len({rig.fault for rig in rigs.values()}) == len(rigs)
 
 
 def test_an_unknown_name_is_refused_with_the_nearest():
@@ -106,18 +106,18 @@ def test_an_unknown_name_is_refused_with_the_nearest():
 def test_the_sound_rig_has_no_deviation(build):
     plant = build("").plant
     plant.q = NEAR_HOME
-    assert believed(plant) == pytest.approx(NEAR_HOME, abs=2e-4)
+    assert computed_joints(plant) == pytest.approx(NEAR_HOME, abs=2e-4)
 
 
 REPORTED = [
     (rig.name, *value)
     for rig in catalogue().values()
-    for value in rig.departure.properties
+    for value in rig.deviation.properties
 ]
 
 
 @pytest.mark.parametrize(("name", "node", "prop", "value"), REPORTED)
-def test_wrong_pucks_report_the_named_deviation(build, name, node, prop, value):
+def test_pucks_report_their_changed_property(build, name, node, prop, value):
     assert get(build(name), node, prop) == [value]
     assert get(build(""), node, prop) != [value]
 
@@ -130,7 +130,7 @@ def test_a_puck_of_other_firmware_has_its_numbers(build):
 
 def test_a_silent_puck_sends_nothing(build):
     rig = build("puck-4-silent")
-    assert {node for _, node, _ in ask(rig)} == set(MOTOR_NODES) - {4}
+    assert {node for _, node, _ in request_positions(rig)} == set(MOTOR_NODES) - {4}
     assert get(rig, 4, "STAT") == []
 
 
@@ -143,11 +143,11 @@ TORQUES = [
 ]
 
 
-@pytest.mark.parametrize(("name", "made"), TORQUES)
-def test_wrong_motors_have_the_named_deviation(build, name, made):
+@pytest.mark.parametrize(("name", "produced"), TORQUES)
+def test_motors_produce_the_stated_torques(build, name, produced):
     rig = build(name)
     asked = [100 * node for node in MOTOR_NODES]
-    wanted = [100 * made.get(node, node) for node in MOTOR_NODES]
+    wanted = [100 * produced.get(node, node) for node in MOTOR_NODES]
     assert rig.plant.wiring.applied_torques(asked) == pytest.approx(wanted, abs=0.5)
 
 
@@ -185,16 +185,16 @@ def test_a_rotor_on_a_torn_cable_reports_no_motion(build):
 def test_a_wrong_zero_offsets_positions(build):
     plant = build("zero-2-off-10deg").plant
     plant.q = NEAR_HOME
-    off = np.degrees(believed(plant) - NEAR_HOME)
+    off = np.degrees(computed_joints(plant) - NEAR_HOME)
     assert off == pytest.approx([0.0, -10.0, 0.0, 0.0, 0.0, 0.0, 0.0], abs=0.02)
 
 
 def test_travel_from_home_is_scaled(build):
     plant = build("wrist-9.48").plant
     plant.q = CONSTANTS.home
-    assert believed(plant) == pytest.approx(CONSTANTS.home, abs=2e-4)
+    assert computed_joints(plant) == pytest.approx(CONSTANTS.home, abs=2e-4)
     plant.q = NEAR_HOME
-    reported = (believed(plant) - CONSTANTS.home) / (NEAR_HOME - CONSTANTS.home)
+    reported = (computed_joints(plant) - CONSTANTS.home) / (NEAR_HOME - CONSTANTS.home)
     shares = [1.0] * 4 + [9.48 / 9.7] * 2 + [1.0]
     assert reported == pytest.approx(shares, abs=3e-3)
 
@@ -215,7 +215,7 @@ def test_gravity_follows_the_mounting_of_the_base(build, name, down):
 
 
 def test_a_turned_base_moves_the_container():
-    frame = true_frame(FRAME, wrong_rig("base-turned-90deg").departure)
+    frame = true_frame(FRAME, wrong_rig("base-turned-90deg").deviation)
     assert frame.far_end == pytest.approx((0.0, -0.70, 0.12))
     assert frame.axes()[0] == pytest.approx([0.0, 1.0, 0.0], abs=1e-9)
 
@@ -230,25 +230,25 @@ SHOWN = [
 
 @pytest.mark.parametrize(("name", "shown"), SHOWN)
 def test_a_wrong_sensor_reports_another_load(name, shown):
-    seen = sensor_reading(lambda _: LOAD, wrong_rig(name).departure)(0)
+    seen = sensor_reading(lambda _: LOAD, wrong_rig(name).deviation)(0)
     assert seen == pytest.approx(shown, abs=6e-4)
 
 
 def test_a_wrong_calibration_matrix_mixes_the_axes():
-    shown = wrong_rig("sensor-foreign-matrix").departure.shown
+    shown = wrong_rig("sensor-foreign-matrix").deviation.shown
     assert 0.02 < np.abs(shown[:3, :3] - np.eye(3)).max() < 0.5
     assert np.linalg.matrix_rank(shown) == 6
 
 
-def test_a_late_sensor_shows_an_earlier_load():
+def test_a_late_sensor_reports_an_earlier_load():
     source = sensor_reading(
-        lambda t_ns: [float(t_ns)] * 6, wrong_rig("sensor-20ms-late").departure
+        lambda t_ns: [float(t_ns)] * 6, wrong_rig("sensor-20ms-late").deviation
     )
     seen = [source(k * 2 * MS)[0] for k in range(50)]
     assert seen[20:] == [float((k - 10) * 2 * MS) for k in range(20, 50)]
 
 
-def test_the_sensors_cable_pulls_at_the_foot(build):
+def test_the_sensors_cable_pulls_on_the_foot(build):
     plants = [build(name).plant for name in ("sensor-cable-pulls", "")]
     for plant in plants:
         plant.advance(plant.t_ns + 10 * MS)
@@ -258,9 +258,9 @@ def test_the_sensors_cable_pulls_at_the_foot(build):
     assert (pulled - free)[3:] == pytest.approx(np.zeros(3), abs=1e-3)
 
 
-def test_wrong_feet_have_the_named_deviation():
+def test_feet_have_the_stated_mass_centre_and_sole():
     def foot(name):
-        return true_tool(TOOL, wrong_rig(name).departure)
+        return true_tool(TOOL, wrong_rig(name).deviation)
 
     assert foot("foot-heavier").foot.mass == pytest.approx(1.5 * TOOL.foot.mass)
     off = foot("centre-off-50mm").foot.com - TOOL.foot.com
@@ -268,30 +268,33 @@ def test_wrong_feet_have_the_named_deviation():
     assert foot("sole-20mm-lower").sole - TOOL.sole == pytest.approx([0, 0, 0.02])
 
 
-def test_a_mistyped_foot_is_wrong_in_the_settings():
+def test_a_mistyped_foot_mass_is_in_the_settings():
     settings = load_settings(None)
     light = with_typing_error(settings, "foot-forgotten")
     assert {foot.mass for foot in light.rig.feet.values()} == {0.05}
     assert with_typing_error(settings, "foot-heavier") is settings
 
 
-def test_wrong_links_and_friction_have_the_named_deviation(build):
-    heavy = true_constants(CONSTANTS, wrong_rig("load-on-elbow").departure)
+def test_links_and_friction_have_the_stated_deviation(build):
+    heavy = true_constants(CONSTANTS, wrong_rig("load-on-elbow").deviation)
     assert heavy.links[2].mass == pytest.approx(CONSTANTS.links[2].mass + 1.0)
-    rubbing, sound = build("friction-threefold").plant, build("").plant
-    assert rubbing.friction.coulomb == pytest.approx(3.0 * sound.friction.coulomb)
+    worn, sound = build("friction-threefold").plant, build("").plant
+    assert worn.friction.coulomb == pytest.approx(3.0 * sound.friction.coulomb)
 
 
 def test_late_positions_arrive_late(build):
-    usual = {node: t_ns for t_ns, node, _ in ask(build(""), 8 * MS)}
-    found = {node: t_ns for t_ns, node, _ in ask(build("replies-a-cycle-late"), 8 * MS)}
-    delays = [(found[node] - usual[node]) / MS for node in MOTOR_NODES]
+    usual = {node: t_ns for t_ns, node, _ in request_positions(build(""), 8 * MS)}
+    late = {
+        node: t_ns
+        for t_ns, node, _ in request_positions(build("replies-a-cycle-late"), 8 * MS)
+    }
+    delays = [(late[node] - usual[node]) / MS for node in MOTOR_NODES]
     assert delays == pytest.approx([2.0] * 7, abs=0.1)
 
 
 def test_one_position_in_a_thousand_is_lost(build):
     rig = build("frames-lost")
-    missing = sum(7 - len(ask(rig)) for _ in range(1000))
+    missing = sum(7 - len(request_positions(rig)) for _ in range(1000))
     assert 1 <= missing <= 18  # of 7000, 7 expected
 
 
@@ -299,15 +302,15 @@ def test_a_duplicated_node_answers_twice(build):
     rig = build("duplicate-node")
     first, second = get(rig, 5, "SN")
     assert first != second
-    assert [node for _, node, _ in ask(rig)].count(5) == 2
-    assert [node for _, node, _ in ask(rig)].count(4) == 1
+    assert [node for _, node, _ in request_positions(rig)].count(5) == 2
+    assert [node for _, node, _ in request_positions(rig)].count(4) == 1
 
 
 def test_another_program_is_on_the_bus(build):
     rig = build("other-master")
     now_ns = rig.network.schedule.now_ns
-    heard = rig.network.due(now_ns + 20 * MS)
-    from_others = [can_id for _, can_id, _ in heard if can_id >> 5 & 0x1F == 20]
+    frames = rig.network.due(now_ns + 20 * MS)
+    from_others = [can_id for _, can_id, _ in frames if can_id >> 5 & 0x1F == 20]
     assert len(set(from_others)) == 3
     assert len(from_others) >= 27
 
@@ -326,7 +329,7 @@ def test_a_disobedient_module_stays_active(build):
     for name in ("module-disobeys", ""):
         rig = build(name)
         rig.network.pendant("activate")
-        say(rig, SAFETY_NODE, encode_set(8, int(SafetyMode.IDLE)))
+        exchange(rig, SAFETY_NODE, encode_set(8, int(SafetyMode.IDLE)))
         modes.append(rig.network.safety_mode)
     assert modes == [SafetyMode.ACTIVE, SafetyMode.IDLE]
 
@@ -343,19 +346,19 @@ def test_a_slow_module_has_a_longer_heartbeat_timeout(build):
     assert modes == [active, idle, idle, idle]
 
 
-def test_a_wrong_module_sets_another_limit(build):
+def test_a_faulty_module_applies_twice_the_speed_limit(build):
     number = property_number(Device.SAFETY, "VL2", 200)
     read = []
     for name in ("vl2-doubled", ""):
         rig = build(name)
-        say(rig, SAFETY_NODE, encode_set(number, 1000))
+        exchange(rig, SAFETY_NODE, encode_set(number, 1000))
         read += get(rig, SAFETY_NODE, "VL2", Device.SAFETY)
     assert read == [2000, 1000]
 
 
-def test_wrong_containers_have_the_named_deviation():
+def test_containers_have_the_stated_deviation():
     def frame(name):
-        return true_frame(replace(FRAME, incline=0.2), wrong_rig(name).departure)
+        return true_frame(replace(FRAME, incline=0.2), wrong_rig(name).deviation)
 
     assert frame("incline-off-5deg").incline == pytest.approx(0.2 + np.radians(5.0))
     assert frame("far-end-off-100mm").far_end == pytest.approx((0.70, 0.0, 0.02))

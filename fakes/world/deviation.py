@@ -11,18 +11,18 @@ from wam.model.constants import Array
 
 # Standard deviations between sound rigs; ASSUMED.
 ZEROS, STOPS, TILT, AXES = np.radians([0.3, 0.7, 0.3, 0.5]).tolist()
-GAINS, MASS, CENTRE, CABLE = 0.005, 0.005, 1e-3, 0.08  # 1, 1, m, N
+GAINS, MASS, CENTRE, CABLE = 0.005, 0.005, 1e-3, 0.08  # -, -, m, N
 
 
-def _no_angles() -> Array:
+def _seven_zeros() -> Array:
     return np.zeros(7)
 
 
-def _no_vector() -> Array:
+def _three_zeros() -> Array:
     return np.zeros(3)
 
 
-def _as_wired() -> Array:
+def _identity_wiring() -> Array:
     return np.eye(7)
 
 
@@ -67,7 +67,7 @@ class ModuleDefects:
     Attributes:
         limits: ratio of a stored limit to the value set: (name, factor), ...
         dead_button: a pendant button without effect; None = none.
-        is_disobedient: it ignores a host that lowers its mode.
+        is_disobedient: the module ignores a host that lowers its mode.
         heartbeat: factor on the heartbeat timeout.
     """
 
@@ -88,11 +88,11 @@ class RigDeviation:
         mount: rotations of the base about x, then y, then z [rad], shape (3,).
         links: additional mass of the links [kg], shape (7,).
         foot_mass: factor on the mass of the foot.
-        foot_centre: shift of its centre of mass [m], frame 7, shape (3,).
+        foot_centre: shift of the foot's centre of mass [m], frame 7, shape (3,).
         sole: shift of the sole [m], frame 7, shape (3,).
-        shown: matrix from the load on the sensor to its reading, shape (6, 6).
+        shown: matrix from the sensor's load to its reading, shape (6, 6).
         force_late: delay of the sensor's reading [s].
-        cable: force of its cable on the foot [N], base frame, shape (3,).
+        cable: force of the sensor's cable on the foot [N], base frame, shape (3,).
         torque: matrix from commanded to true motor torques, shape (7, 7).
         counts: matrix from true to reported motor travel from home, shape (7, 7).
         torn: motor whose cable to the joints is torn, 1-7; 0 = none.
@@ -102,22 +102,22 @@ class RigDeviation:
         module: faults of the safety module.
         bus: faults of the bus.
         place: error of the container's location.
-        typed_foot_mass: mass of the foot as typed in rig.toml [kg]; None = correct.
+        typed_foot_mass: mistyped mass of the foot in rig.toml [kg]; None = correct.
     """
 
-    zeros: Array = field(default_factory=_no_angles)
+    zeros: Array = field(default_factory=_seven_zeros)
     stops: Array = field(default_factory=lambda: np.zeros((2, 7)))
     ratios: Array = field(default_factory=lambda: np.ones(7))
-    mount: Array = field(default_factory=_no_vector)
-    links: Array = field(default_factory=_no_angles)
+    mount: Array = field(default_factory=_three_zeros)
+    links: Array = field(default_factory=_seven_zeros)
     foot_mass: float = 1.0
-    foot_centre: Array = field(default_factory=_no_vector)
-    sole: Array = field(default_factory=_no_vector)
+    foot_centre: Array = field(default_factory=_three_zeros)
+    sole: Array = field(default_factory=_three_zeros)
     shown: Array = field(default_factory=lambda: np.eye(6))
     force_late: float = 0.0
-    cable: Array = field(default_factory=_no_vector)
-    torque: Array = field(default_factory=_as_wired)
-    counts: Array = field(default_factory=_as_wired)
+    cable: Array = field(default_factory=_three_zeros)
+    torque: Array = field(default_factory=_identity_wiring)
+    counts: Array = field(default_factory=_identity_wiring)
     torn: int = 0
     friction: float = 1.0
     properties: tuple[tuple[int, str, int], ...] = ()
@@ -165,7 +165,7 @@ def rotated_axes(angles: Sequence[float]) -> Array:
 def draw_sound_rig(seed: int) -> RigDeviation:
     """Return the deviation of the sound rig of `seed` from its drawings.
 
-    It has its own generator: no other random quantity of the rig changes.
+    A separate generator is used, so no other random quantity of the rig changes.
     """
     generator = sound_rig_generator(seed)
 
