@@ -1,4 +1,4 @@
-"""Possible states of a disk after a list of operations and a power cut."""
+"""Possible states of a disk after a sequence of operations and a power cut."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -19,8 +19,8 @@ from tests.crash.syscalls import (
     Write,
 )
 
-FOLDER = 0  # in place of the number of a file
-HOW = ("none", "all", "first", "torn", "some", "zeros")
+FOLDER = 0  # takes the place of a file number
+OUTCOMES = ("none", "all", "first", "torn", "some", "zeros")
 
 
 @dataclass
@@ -28,25 +28,25 @@ class Disk:
     """Names and contents on a disk after a power cut.
 
     Attributes:
-        names: number of the file at each path, `FOLDER` for a folder.
-        contents: bytes by number of the file.
+        names: file number by path, `FOLDER` for a folder.
+        contents: bytes by file number.
     """
 
     names: dict[Path, int] = field(default_factory=dict)
     contents: dict[int, bytes] = field(default_factory=dict)
 
     def files(self) -> dict[Path, bytes]:
-        """Content at every path that can be reached from the root."""
+        """Return the content of every file reachable from the root, by path."""
         return {
             path: self.contents.get(number, b"")
             for path, number in self.names.items()
-            if number != FOLDER and self._is_reached(path)
+            if number != FOLDER and self._is_reachable(path)
         }
 
     def folders(self) -> list[Path]:
-        """Folders that can be reached from the root, outer ones first."""
+        """Return the folders reachable from the root, outer ones first."""
         names = [path for path, number in self.names.items() if number == FOLDER]
-        return sorted(path for path in names if self._is_reached(path))
+        return sorted(path for path in names if self._is_reachable(path))
 
     def write(self, folder: Path) -> None:
         """Write the files into the new folder `folder`."""
@@ -62,34 +62,34 @@ class Disk:
             first[number] = folder / path
             first[number].write_bytes(content)
 
-    def _is_reached(self, path: Path) -> bool:
+    def _is_reachable(self, path: Path) -> bool:
         outer = list(path.parents)[:-1]
         return all(self.names.get(folder) == FOLDER for folder in outer)
 
 
-def everything(operations: Sequence[Operation]) -> Disk:
-    """Disk after all operations and no power cut."""
+def after_all(operations: Sequence[Operation]) -> Disk:
+    """Return the disk after all operations without a power cut."""
     return _disk(list(operations))
 
 
 def after_power_cut(operations: Sequence[Operation], rng: np.random.Generator) -> Disk:
-    """One possible disk after a power cut right after `operations`.
+    """Return one possible disk after a power cut right after `operations`.
 
-    What was forced to the disk is there. Of the rest, each file and each folder has
-    nothing, everything, a first part, a torn last part, any part, or zeros.
+    Synced operations are on the disk. Of the others, each file and each folder keeps
+    none, all, the first, the first with the last one torn, a random part, or zeros.
     """
-    forced = _forced(operations)
-    kept = []
+    synced = _synced(operations)
+    survived = []
     for members in _by_object(operations).values():
-        early = [i for i in members if i in forced]
-        late = [i for i in members if i not in forced]
-        kept += [(i, operations[i]) for i in early]
-        kept += _part(late, operations, rng)
-    return _disk([operation for _, operation in sorted(kept, key=lambda pair: pair[0])])
+        synced_part = [i for i in members if i in synced]
+        unsynced_part = [i for i in members if i not in synced]
+        survived += [(i, operations[i]) for i in synced_part]
+        survived += _random_part(unsynced_part, operations, rng)
+    return _disk([operation for _, operation in sorted(survived, key=lambda p: p[0])])
 
 
 def _object_of(operation: Operation) -> int | Path:
-    """File or folder whose content an operation changes."""
+    """Return the file or folder whose content an operation changes."""
     match operation:
         case Write() | Truncate() | SyncFile():
             return operation.file
@@ -109,33 +109,33 @@ def _by_object(operations: Sequence[Operation]) -> dict[int | Path, list[int]]:
     return members
 
 
-def _forced(operations: Sequence[Operation]) -> set[int]:
-    """Indices of all operations that a later one forced to the disk."""
-    forced: set[int] = set()
+def _synced(operations: Sequence[Operation]) -> set[int]:
+    """Return the indices of all operations that a later one synced to the disk."""
+    synced: set[int] = set()
     waiting: dict[int | Path, list[int]] = {}
     for i, operation in enumerate(operations):
         if isinstance(operation, SyncFile | SyncFolder):
-            forced.update(waiting.pop(_object_of(operation), []))
+            synced.update(waiting.pop(_object_of(operation), []))
         else:
             waiting.setdefault(_object_of(operation), []).append(i)
-    return forced
+    return synced
 
 
-def _part(
-    late: list[int], operations: Sequence[Operation], rng: np.random.Generator
+def _random_part(
+    unsynced: list[int], operations: Sequence[Operation], rng: np.random.Generator
 ) -> list[tuple[int, Operation]]:
-    """Random part, on the disk, of operations that were not forced there."""
-    how = HOW[rng.integers(len(HOW))]
-    if how == "none" or not late:
+    """Return the part of the unsynced operations that reached the disk."""
+    outcome = OUTCOMES[rng.integers(len(OUTCOMES))]
+    if outcome == "none" or not unsynced:
         return []
-    if how in {"first", "torn"}:
-        late = late[: int(rng.integers(len(late) + 1))]
-    elif how == "some":
-        late = [i for i in late if rng.random() < 0.5]
-    part = [(i, operations[i]) for i in late]
-    if how == "torn" and part:
+    if outcome in {"first", "torn"}:
+        unsynced = unsynced[: int(rng.integers(len(unsynced) + 1))]
+    elif outcome == "some":
+        unsynced = [i for i in unsynced if rng.random() < 0.5]
+    part = [(i, operations[i]) for i in unsynced]
+    if outcome == "torn" and part:
         part[-1] = (part[-1][0], _torn(part[-1][1], rng))
-    if how == "zeros":
+    if outcome == "zeros":
         part = [(i, _zeroed(operation)) for i, operation in part]
     return part
 

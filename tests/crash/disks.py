@@ -1,44 +1,46 @@
-"""Rows of failing disks: power cuts, failing writes and reads, full disks."""
+"""Attack-table rows for disks: power cuts, I/O errors, full disks."""
 
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from tests.attacks.attack import Attack, RunBy
-from tests.crash.io_errors import KINDS, fail
-from tests.crash.power_cuts import record_session, survive
+from tests.crash.io_errors import KINDS, problems_with_failing_disks
+from tests.crash.power_cuts import problems_after_power_cuts, record_session
 from tests.crash.syscalls import Recording
 
-_CUTS = 120  # of a row
-_NIGHTS = range(2, 10)  # seeds
-_DISKS = 60  # failing disks of a kind, in a night
+_CUTS_PER_ROW = 120  # power cuts
+_NIGHTLY_SEEDS = range(2, 10)
+_NIGHTLY_RUNS = 60  # sessions per kind of failure
 
 
 def disk_attacks() -> list[Attack]:
-    """Rows of power cuts, and of each kind of failing disk."""
+    """Return the rows for each power-cut seed and each kind of disk failure."""
     rows = [_power_cuts(1, RunBy.CI)]
-    rows += [_power_cuts(seed, RunBy.NIGHTLY) for seed in _NIGHTS]
+    rows += [_power_cuts(seed, RunBy.NIGHTLY) for seed in _NIGHTLY_SEEDS]
     rows += [_failing(kind, 1, 1, RunBy.CI) for kind in KINDS]
-    rows += [_failing(kind, 2, _DISKS, RunBy.NIGHTLY) for kind in KINDS]
+    rows += [_failing(kind, 2, _NIGHTLY_RUNS, RunBy.NIGHTLY) for kind in KINDS]
     return rows
 
 
 @cache
 def recorded_session() -> Recording:
-    """A session whose every change of the disk is recorded, made once."""
+    """Record a session with every disk operation; cached."""
     with TemporaryDirectory(prefix="disks-") as folder:
         return record_session(Path(folder))
 
 
 def _power_cuts(seed: int, run_by: RunBy) -> Attack:
     def check(folder: Path) -> None:
-        problems = survive(recorded_session(), folder, _CUTS, seed)
+        problems = problems_after_power_cuts(
+            recorded_session(), folder, _CUTS_PER_ROW, seed
+        )
         assert not problems, "; ".join(problems)
 
     return Attack(
         "power cut",
-        f"{_CUTS} moments of a session, seed {seed}",
-        "no kept trial is lost; the session is put in order",
+        f"{_CUTS_PER_ROW} random moments of a session, seed {seed}",
+        "no kept trial is lost; the session can be repaired",
         check,
         run_by,
         seconds=400,
@@ -47,13 +49,13 @@ def _power_cuts(seed: int, run_by: RunBy) -> Attack:
 
 def _failing(kind: str, seed: int, count: int, run_by: RunBy) -> Attack:
     def check(folder: Path) -> None:
-        problems = fail(folder, count, seed, (kind,))
+        problems = problems_with_failing_disks(folder, count, seed, (kind,))
         assert not problems, "; ".join(problems)
 
     return Attack(
         f"disk {kind}",
-        f"{count} moments of a session, seed {seed}",
-        "said with an exit code; no kept trial is lost",
+        f"{count} random moments of a session, seed {seed}",
+        "the error is reported with an exit code; no kept trial is lost",
         check,
         run_by,
         seconds=120.0 * count,

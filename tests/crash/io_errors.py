@@ -1,4 +1,4 @@
-"""Sessions on a full or broken disk, or in a process without descriptors."""
+"""Sessions on a full or broken disk, or without free file descriptors."""
 
 import errno
 import shutil
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from experiments.operator.auto_operator import AutoOperator
-from tests.crash.inspection import acknowledged, problems, recordings
+from tests.crash.inspection import acknowledged, find_problems, recordings
 from tests.crash.syscalls import recorded
 from tests.experiments.program import Done, run_short, traction, write_config
 from tests.experiments.run.test_resume import short
@@ -23,21 +23,21 @@ KINDS = (
     "broken-read",
     "no-descriptors",
 )
-ENDED = {0, 2, 4, 5, 6}
+EXPECTED_CODES = {0, 2, 4, 5, 6}
 AUTO = ("--operator-script", "auto")
-BYTES = 400_000  # written by a session, roughly
-CALLS = 500  # made by a session, roughly
+BYTES = 400_000  # written by a session, approximately
+CALLS = 500  # system calls of a session, approximately
 
 
 @dataclass
 class FailingDisk:
-    """Makes calls of one kind fail from some moment on; a `limit` of `recorded`.
+    """Makes calls of one kind fail from a given one on; a `limit` of `recorded`.
 
     Attributes:
         kind: one of `KINDS`.
-        left: bytes until the disk is full, or calls until it breaks.
-        lasts: number of calls that fail.
-        failed: number of calls that have failed.
+        left: remaining bytes until the disk is full, or calls until it fails.
+        lasts: number of failing calls.
+        failed: number of calls that failed so far.
     """
 
     kind: str
@@ -48,13 +48,13 @@ class FailingDisk:
     def __call__(self, name: str, size: int) -> int:
         if self.kind.startswith("full"):
             return self._full(name, size)
-        wanted = {
+        failing_calls = {
             "broken": {"write", "fsync", "replace", "create"},
             "broken-sync": {"fsync"},
             "broken-read": {"read", "list"},
             "no-descriptors": {"open", "create", "list"},
         }[self.kind]
-        if name in wanted:
+        if name in failing_calls:
             self.left -= 1
             if self.left < 0 and self.failed < self.lasts:
                 number = errno.EMFILE if self.kind == "no-descriptors" else errno.EIO
@@ -78,40 +78,46 @@ class FailingDisk:
 
 
 def random_disk(rng: np.random.Generator, kinds: Sequence[str]) -> FailingDisk:
-    """A disk that fails at a random moment of a session."""
+    """Return a disk that fails at a random moment of a session."""
     kind = kinds[rng.integers(len(kinds))]
     lasts = int(rng.integers(1, 6)) if kind != "full" else 1 << 30
     left = rng.integers(BYTES) if kind.startswith("full") else rng.integers(CALLS)
     return FailingDisk(kind, int(left), lasts)
 
 
-def fail(folder: Path, runs: int, seed: int, kinds: Sequence[str] = KINDS) -> list[str]:
-    """Run sessions on failing disks; the problems that follow.
+def problems_with_failing_disks(
+    folder: Path, runs: int, seed: int, kinds: Sequence[str] = KINDS
+) -> list[str]:
+    """Run sessions on failing disks and return the problems found.
 
     A session has two trials; then a verdict is changed and a kept trial repeated. The
-    disk is sound again when its files are inspected.
+    disk works again when its files are inspected.
     """
     config = write_config(folder)
     rng = np.random.default_rng(seed)
-    wrong = []
+    problems = []
     for number in range(runs):
         disk = random_disk(rng, kinds)
         root = folder / f"disk{number}"
         root.mkdir()
         with recorded(root, disk) as recording:
-            done = use(config, root / "data")
+            done = run_commands(config, root / "data")
         operations = recording.operations
-        texts = [f"ended with {d.code}: {d.err}" for d in done if d.code not in ENDED]
+        texts = [
+            f"ended with {d.code}: {d.err}"
+            for d in done
+            if d.code not in EXPECTED_CODES
+        ]
         if disk.failed and not any(d.err or "▲" in d.out for d in done):
-            texts.append("nothing was said")
-        texts += problems(root, acknowledged(operations), recordings(operations))
-        wrong += [f"{number} {disk}: {text}" for text in texts]
+            texts.append("the error was not reported")
+        texts += find_problems(root, acknowledged(operations), recordings(operations))
+        problems += [f"{number} {disk}: {text}" for text in texts]
         shutil.rmtree(root)
-    return wrong
+    return problems
 
 
-def use(config: Path, data: Path) -> list[Done]:
-    """Run a session and change it; the result of each command."""
+def run_commands(config: Path, data: Path) -> list[Done]:
+    """Run a session and change it; return the result of each command."""
     options = ("--data", data)
     done = [run_session(config, data)]
     if done[0].code == 0:
@@ -123,12 +129,12 @@ def use(config: Path, data: Path) -> list[Done]:
 
 
 def run_session(config: Path, data: Path) -> Done:
-    """Run two short trials; even the creation of the session may fail."""
-    usual = AutoOperator.answer
+    """Run two short trials; the creation of the session may fail, too."""
+    original = AutoOperator.answer
 
     def answer(self, asked):
         key = short(asked)
-        return usual(self, asked) if key is None else key
+        return original(self, asked) if key is None else key
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(AutoOperator, "answer", answer)

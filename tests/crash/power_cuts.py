@@ -1,4 +1,4 @@
-"""Power cuts anywhere in a session whose every change of the disk is recorded."""
+"""Power cuts at random disk operations of a recorded session."""
 
 import shutil
 from pathlib import Path
@@ -9,9 +9,9 @@ from experiments.operator.prompts import Prompt
 from tests.crash.disk import after_power_cut
 from tests.crash.inspection import (
     acknowledged,
-    problems,
-    put_in_order,
+    find_problems,
     recordings,
+    repair_sessions,
 )
 from tests.crash.syscalls import Recording, recorded
 from tests.experiments.program import run_watched, traction, write_config
@@ -21,7 +21,7 @@ AUTO = ("--operator-script", "auto")
 
 
 def record_session(folder: Path) -> Recording:
-    """Operations of a session with a rejected trial and changed verdicts.
+    """Record the disk operations of a session with changed verdicts.
 
     T01 is rejected, T01 and T02 are kept; later T01b is rejected and kept again and
     T02 is repeated.
@@ -54,13 +54,15 @@ def record_session(folder: Path) -> Recording:
     return recording
 
 
-def survive(recording: Recording, folder: Path, cuts: int, seed: int) -> list[str]:
-    """Cut the power `cuts` times at random moments; the problems that follow.
+def problems_after_power_cuts(
+    recording: Recording, folder: Path, cuts: int, seed: int
+) -> list[str]:
+    """Cut the power `cuts` times at random moments and return the problems found.
 
-    Every third disk is recovered while the power fails once more.
+    On every third disk the power fails again during recovery.
     """
     rng = np.random.default_rng(seed)
-    wrong = []
+    problems = []
     for number in range(cuts):
         length = int(rng.integers(len(recording.operations) + 1))
         operations = recording.operations[:length]
@@ -69,11 +71,11 @@ def survive(recording: Recording, folder: Path, cuts: int, seed: int) -> list[st
         after_power_cut(operations, rng).write(root)
         if number % 3 == 0:
             with recorded(root) as second:
-                put_in_order(root / "data")
+                repair_sessions(root / "data")
             shutil.rmtree(root)
             until = int(rng.integers(second.start, len(second.operations) + 1))
             after_power_cut(second.operations[:until], rng).write(root)
-        texts = problems(root, wanted, recordings(operations))
-        wrong += [f"{number} after {length} operations: {text}" for text in texts]
+        texts = find_problems(root, wanted, recordings(operations))
+        problems += [f"{number} after {length} operations: {text}" for text in texts]
         shutil.rmtree(root)
-    return wrong
+    return problems

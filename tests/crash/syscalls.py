@@ -1,8 +1,8 @@
-"""Records the changes of the disk at the system calls of the program.
+"""Record the disk operations of the program at its system calls.
 
-The program is not changed and nothing is simulated: every call goes through, and its
-effect on files below one folder is recorded. `test_disks` shows that the list is
-complete: replayed, it gives the files that are on the disk.
+The program is unchanged and nothing is simulated: every call is executed, and its
+effect on files below one folder is recorded. `test_disks` checks that the record is
+complete: replaying it gives the files on the disk.
 """
 
 import io
@@ -20,7 +20,7 @@ _REAL_OPEN = io.open
 
 @dataclass(frozen=True, slots=True)
 class Write:
-    """Bytes that were written into a file."""
+    """Bytes were written to a file."""
 
     file: int
     offset: int
@@ -29,7 +29,7 @@ class Write:
 
 @dataclass(frozen=True, slots=True)
 class Truncate:
-    """A file that was cut, or extended by zeros."""
+    """A file was truncated, or extended by zeros."""
 
     file: int
     size: int
@@ -37,28 +37,28 @@ class Truncate:
 
 @dataclass(frozen=True, slots=True)
 class SyncFile:
-    """A file that was forced to the disk."""
+    """A file was synced to the disk."""
 
     file: int
 
 
 @dataclass(frozen=True, slots=True)
 class MakeFolder:
-    """A folder that was made; paths are relative to the recorded folder."""
+    """A folder was created; paths are relative to the recorded folder."""
 
     path: Path
 
 
 @dataclass(frozen=True, slots=True)
 class RemoveFolder:
-    """A folder that was removed."""
+    """A folder was removed."""
 
     path: Path
 
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A name given to a file, the first or another."""
+    """A name was given to a new or an existing file."""
 
     path: Path
     file: int
@@ -66,14 +66,14 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class Unlink:
-    """A name that was removed."""
+    """A name was removed."""
 
     path: Path
 
 
 @dataclass(frozen=True, slots=True)
 class Replace:
-    """A name that was exchanged for another in the same folder."""
+    """A file was renamed in its folder, replacing any file of that name."""
 
     source: Path
     target: Path
@@ -82,7 +82,7 @@ class Replace:
 
 @dataclass(frozen=True, slots=True)
 class SyncFolder:
-    """A folder whose names were forced to the disk."""
+    """The names in a folder were synced to the disk."""
 
     path: Path
 
@@ -100,25 +100,25 @@ Operation = (
 )
 
 
-# Gets the name of a call and how many bytes it wants to write (0 where it writes none);
-# returns how many it may, or raises what the kernel would.
+# Called with the name of a call and its bytes to write (0 = none); returns the bytes
+# that it may write, or raises the kernel's error.
 Limit = Callable[[str, int], int]
 
 
 def without_limit(_: str, size: int) -> int:
-    """Let every call through."""
+    """Return `size`: every call succeeds."""
     return size
 
 
 class Recording:
     """The operations on files and folders below `root`, in order.
 
-    Existing files and folders count as made and forced to the disk before.
+    Existing files and folders count as created and synced before.
 
     Attributes:
         root: the recorded folder.
         operations: operations below that folder.
-        start: number of operations that made the existing files.
+        start: number of operations that created the existing files.
     """
 
     def __init__(self, root: Path, limit: Limit) -> None:
@@ -129,17 +129,17 @@ class Recording:
         self._open: dict[int, int] = {}
         self._appending: set[int] = set()
         self._files = 0
-        self._take_over()
+        self._add_existing()
         self.start = len(self.operations)
 
-    def _take_over(self) -> None:
-        known: dict[int, Path] = {}
+    def _add_existing(self) -> None:
+        first_names: dict[int, Path] = {}
         for path in sorted(self.root.rglob("*")):
             below = path.relative_to(self.root)
             if path.is_dir():
                 self.operations.append(MakeFolder(below))
                 continue
-            first = known.setdefault(path.stat().st_ino, below)
+            first = first_names.setdefault(path.stat().st_ino, below)
             if first != below:
                 self.linked(first, below)
                 continue
@@ -151,7 +151,7 @@ class Recording:
         ]
 
     def below(self, path: object, folder: int | None = None) -> Path | None:
-        """`path` relative to the root; None outside the root."""
+        """Return `path` relative to the root; None outside the root."""
         if not isinstance(path, str | os.PathLike):
             return None
         location = Path(os.fspath(path))
@@ -162,14 +162,14 @@ class Recording:
         return location.relative_to(self.root) if inside else None
 
     def is_inside(self, file: object) -> bool:
-        """Whether a path or a descriptor is below the root."""
+        """Return whether a path or a descriptor is below the root."""
         location = (
             Path(f"/proc/self/fd/{file}").readlink() if type(file) is int else file
         )
         return self.below(location) is not None
 
     def opened(self, path: Path, descriptor: int, flags: int, *, was_there: bool):
-        """Record a file that was opened, and whether the file is new or was emptied."""
+        """Record the opening of a file, which may create or truncate it."""
         if not flags & _WRITING:
             return
         if not was_there:
@@ -189,7 +189,7 @@ class Recording:
             self.operations.append(Write(self._open[descriptor], offset, data))
 
     def write_offset(self, descriptor: int) -> int:
-        """Offset of the next write of a descriptor; 0 outside the folder."""
+        """Return the offset of the next write of a descriptor; 0 outside the folder."""
         if descriptor not in self._open:
             return 0
         if descriptor in self._appending:
@@ -217,7 +217,7 @@ class Recording:
         self.operations.append(Unlink(path))
 
     def replaced(self, source: Path, target: Path) -> None:
-        assert source.parent == target.parent, "a rename that is no atomic one"
+        assert source.parent == target.parent, "a rename across folders is not atomic"
         number = self._names[target] = self._names.pop(source)
         self.operations.append(Replace(source, target, number))
 
@@ -229,7 +229,7 @@ class Recording:
 
 
 class _RecordedFile(io.FileIO):
-    """A file whose writes are recorded; the buffer above it is Python's own."""
+    """A file whose writes are recorded; Python buffers them as usual."""
 
     recording: Recording
 
@@ -275,7 +275,7 @@ def _flags(mode: str) -> int:
 
 
 def _recorded_open(recording: Recording):
-    """Replacement of `io.open` and `os.fdopen`."""
+    """Return a replacement of `io.open` and `os.fdopen`."""
     kind = type("_File", (_RecordedFile,), {"recording": recording})
     read_only = type("_Read", (_LimitedFile,), {"limit": staticmethod(recording.limit)})
 
@@ -313,7 +313,7 @@ def _recorded_open(recording: Recording):
 
 
 def _recorded_calls(recording: Recording):
-    """Replacements of the calls of `os`, by name."""
+    """Return replacements of the writing calls of `os`, by name."""
     real = {name: getattr(os, name) for name in _CALLS}
 
     def os_open(path, flags, mode=0o777, *, dir_fd=None):
@@ -377,13 +377,13 @@ def _recorded_calls(recording: Recording):
 
     def fsync(descriptor):
         recording.limit("fsync", 0)
-        recording.synced(descriptor)  # the order counts; no need to wait
+        recording.synced(descriptor)  # only the order matters: do not sync
 
     def close(descriptor):
         recording.closed(descriptor)
         real["close"](descriptor)
 
-    done = recording.operations.append
+    record = recording.operations.append
     return {
         "open": os_open,
         "link": link,
@@ -391,8 +391,8 @@ def _recorded_calls(recording: Recording):
         "rename": replace,
         "unlink": on_name("unlink", recording.unlinked),
         "remove": on_name("remove", recording.unlinked),
-        "mkdir": on_name("mkdir", lambda path: done(MakeFolder(path))),
-        "rmdir": on_name("rmdir", lambda path: done(RemoveFolder(path))),
+        "mkdir": on_name("mkdir", lambda path: record(MakeFolder(path))),
+        "rmdir": on_name("rmdir", lambda path: record(RemoveFolder(path))),
         "write": write,
         "pwrite": pwrite,
         "ftruncate": ftruncate,
@@ -402,7 +402,7 @@ def _recorded_calls(recording: Recording):
 
 
 def _reading_calls(recording: Recording):
-    """Replacements of the reading calls of `os`, by name."""
+    """Return replacements of the reading calls of `os`, by name."""
 
     def on_read(name, what):
         real = getattr(os, name)
@@ -437,11 +437,11 @@ _CALLS = [
 
 @contextmanager
 def recorded(root: Path, limit: Limit = without_limit) -> Generator[Recording]:
-    """Record what this process does to files below `root` in the context.
+    """Record this process's operations on files below `root` in the context.
 
     Args:
         root: the recorded folder.
-        limit: makes calls fail as on a full or broken disk; these are not recorded.
+        limit: makes calls fail as on a full or broken disk; they are not recorded.
     """
     recording = Recording(root, limit)
     with pytest.MonkeyPatch.context() as patch:

@@ -1,9 +1,9 @@
-"""Disks that fail in a session: a message, an exit code, and nothing kept is lost."""
+"""A failing disk is reported with an exit code and loses no kept trial."""
 
 import pytest
 
 from tests.attacks.parameters import parameters
-from tests.crash.disk import everything
+from tests.crash.disk import after_all
 from tests.crash.disks import disk_attacks
 from tests.crash.power_cuts import record_session
 
@@ -19,5 +19,5 @@ def test_replaying_the_recording_gives_the_disk_content(tmp_path):
     recording = record_session(tmp_path)
     root = recording.root
     files = [path for path in root.rglob("*") if path.is_file()]
-    written = everything(recording.operations).files()
+    written = after_all(recording.operations).files()
     assert written == {p.relative_to(root): p.read_bytes() for p in files}

@@ -23,7 +23,7 @@ from experiments.session.sidecar import TrialName, TrialOutcome, recording_of
 from experiments.session.states import Event
 from experiments.session.store import SessionFolder, create_session, list_sessions
 from tests.acquisition.trials import make_cycles, write_trial
-from tests.crash.disk import everything
+from tests.crash.disk import after_all
 from tests.crash.syscalls import MakeFolder, SyncFile, SyncFolder, recorded
 from tests.experiments.test_recorded_session import SESSION
 
@@ -250,7 +250,7 @@ def test_readers_follow_the_journal_and_write_nothing(folder):
 def kills(operations):
     """State of the disk after each operation that changes it."""
     for count, operation in enumerate(operations, 1):
-        disk = everything(operations[:count])
+        disk = after_all(operations[:count])
         is_made = {path.name for path in disk.folders()} >= NEEDED
         if is_made and not isinstance(operation, SyncFile | SyncFolder | MakeFolder):
             yield disk
