@@ -1,6 +1,6 @@
-"""Sessions whose journal lost lines, or that were copied and renamed, are reported.
+"""Sessions with lost journal lines, and copied or renamed ones, are reported.
 
-This damage can be read without an error; silence would be the harm.
+Such files can be read without an error, so a missing report is the failure.
 """
 
 import json
@@ -8,34 +8,34 @@ import os
 import re
 from pathlib import Path
 
-from tests.corpus.used_session import printed, session_file, session_files
+from tests.corpus.used_session import run_command, session_file, session_files
 
-KEPT = 2  # trials of the session
-_SOUND_NAME = re.compile(r"\d{4}-\d\d-\d\d_S001_TF\.fake")  # a date is no identity
+KEPT = 2  # kept trials of the session
+_SOUND_NAME = re.compile(r"\d{4}-\d\d-\d\d_S001_TF\.fake")  # on any date
 _REFUSED, _NOT_AS_KEPT = 2, 6  # exit codes
 _MAX_COPIES = 12
 
 
 class SilentError(Exception):
-    """Something is missing or doubled, and was not reported."""
+    """A trial or line is missing or duplicated, and no report was made."""
 
 
 def all_lines() -> bytes:
-    """Numbers of all lines of the journal, as `use_lines` reads them."""
+    """Return the numbers of all lines of the journal, for `check_lines`."""
     count = session_file("/events.jsonl").count(b"\n")
     return b" ".join(b"%d" % number for number in range(count))
 
 
 def all_names() -> bytes:
-    """Name of the session's folder, as `use_names` reads it."""
+    """Return the name of the session's folder, for `check_names`."""
     return _name().encode()
 
 
-def use_lines(data: bytes, folder: Path) -> None:
-    """Keep the lines of the journal that `data` numbers, in that order.
+def check_lines(data: bytes, folder: Path) -> None:
+    """Check a session whose journal has the lines numbered in `data`, in that order.
 
     Raises:
-        SilentError: `verify` finds nothing wrong with a changed journal.
+        SilentError: `verify` accepts a changed journal.
     """
     lines = session_file("/events.jsonl").splitlines(keepends=True)
     numbers = [int(word) for word in re.findall(rb"\d{1,3}", data)]
@@ -44,14 +44,14 @@ def use_lines(data: bytes, folder: Path) -> None:
     _require(folder, is_sound=journal == b"".join(lines))
 
 
-def use_names(data: bytes, folder: Path) -> None:
-    """Put a copy of the session under each name that a line of `data` gives.
+def check_names(data: bytes, folder: Path) -> None:
+    """Check copies of the session, named by the lines of `data`.
 
     Raises:
-        SilentError: a trial counts twice, or `verify` finds nothing wrong with more
-            than one copy or with a name that contradicts the content.
+        SilentError: a trial is counted twice, or `verify` accepts more than one copy
+            or a name that contradicts the content.
     """
-    names = [name for name in map(_as_name, data.split(b"\n")) if name]
+    names = [name for name in map(_folder_name, data.split(b"\n")) if name]
     copies = list(dict.fromkeys(names))[:_MAX_COPIES]
     for name in copies:
         _write(folder, name, session_file("/events.jsonl"))
@@ -64,8 +64,8 @@ def _name() -> str:
     return journal.split("/")[1]
 
 
-def _as_name(line: bytes) -> str:
-    """A line as the name of a folder, "" if no folder can have the name."""
+def _folder_name(line: bytes) -> str:
+    """Return a line as the name of a folder, "" if it is not a valid name."""
     name = os.fsdecode(line.replace(b"/", b"").replace(b"\0", b""))[:100]
     return "" if name in {".", ".."} or len(os.fsencode(name)) > 250 else name
 
@@ -80,11 +80,11 @@ def _write(folder: Path, name: str, journal: bytes) -> None:
 
 
 def _require(folder: Path, *, is_sound: bool) -> None:
-    """Require that `verify` reports what is not sound and `status` counts it once."""
-    code, out = printed("verify", "--all", "--data", str(folder))
+    """Require that `verify` reports damage and `status` counts no trial twice."""
+    code, out = run_command("verify", "--all", "--data", str(folder))
     if code not in ({0} if is_sound else {_REFUSED, _NOT_AS_KEPT}):
         raise SilentError(f"verify ended with {code}: {out}")
-    code, out = printed("status", "--json", "--data", str(folder))
+    code, out = run_command("status", "--json", "--data", str(folder))
     kept = sum(row["kept"] for row in json.loads(out)) if code == 0 else 0
     if kept > KEPT or (is_sound and kept != KEPT):
         raise SilentError(f"status counts {kept} trials of {KEPT}")

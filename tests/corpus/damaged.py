@@ -1,4 +1,4 @@
-"""Damaged inputs of every kind are read in a process of little memory."""
+"""Damaged inputs of every kind are read in a process with limited memory."""
 
 import json
 import subprocess
@@ -14,7 +14,7 @@ _EACH_NIGHT = [range(first, first + 500) for first in range(1000, 3000, 500)]
 
 
 def damage_attacks() -> list[Attack]:
-    """Rows of twenty, and of five hundred, inputs of every kind."""
+    """Return rows of 20 damaged inputs per kind, and nightly ones of 500."""
     rows = [_attack(kind, _EACH_COMMIT, RunBy.CI) for kind in READERS]
     for seeds in _EACH_NIGHT:
         rows += [_attack(kind, seeds, RunBy.NIGHTLY) for kind in READERS]
@@ -29,7 +29,7 @@ def _attack(kind: str, seeds: range, run_by: RunBy) -> Attack:
     return Attack(
         f"{kind} damaged",
         f"seeds {seeds[0]} to {seeds[-1]}",
-        "read, or refused with its cause, within 300 MB and 10 s",
+        "read, or refused with a reason, within 300 MB and 10 s",
         check,
         run_by,
         seconds=600,
@@ -37,9 +37,9 @@ def _attack(kind: str, seeds: range, run_by: RunBy) -> Attack:
 
 
 def read_damaged(kind: str, seeds: range) -> list[str]:
-    """Read the mutations `seeds` of a kind; the problems that follow.
+    """Read the mutations `seeds` of a kind; return the problems.
 
-    A mutation that ends the reading process is named; another process reads the rest.
+    A mutation that ends the reading process is reported; a new process reads the rest.
     """
     problems: list[str] = []
     while seeds:

@@ -1,4 +1,4 @@
-"""Logs of other robots and their URDFs: sound samples, and how they are read."""
+"""Logs of other robots and their URDFs: valid samples and their readers."""
 
 import tempfile
 from collections.abc import Callable
@@ -18,13 +18,19 @@ from analysis.logs.messages import (
 from analysis.logs.record import RECORD, read_record
 from analysis.logs.robot import RobotLeg, parse_urdf
 from analysis.logs.suggestions import ListRequest, listing
-from tests.analysis.logs.gantry import URDF, Rubbing, stated, write_bag, write_bag2
+from tests.analysis.logs.gantry import (
+    URDF,
+    StrokeLog,
+    import_request,
+    write_bag,
+    write_bag2,
+)
 
-SHORT = Rubbing(joint_rate=100.0, wrench_rate=100.0)
+SHORT = StrokeLog(joint_rate=100.0, wrench_rate=100.0)
 
 
-def read_log(name: str) -> Callable[[bytes, Path], None]:
-    """A reader that lists its bytes as a log, and imports them."""
+def log_reader(name: str) -> Callable[[bytes, Path], None]:
+    """Return a reader that lists and imports its bytes as the log file `name`."""
 
     def read(data: bytes, folder: Path) -> None:
         path, urdf = folder / name, folder / "robot.urdf"
@@ -32,7 +38,7 @@ def read_log(name: str) -> Callable[[bytes, Path], None]:
         urdf.write_text(URDF)
         for _ in listing(ListRequest(path, urdf, "foot", "gauge", "ground-on-foot")):
             pass
-        import_log(stated(SHORT, path, urdf))
+        import_log(import_request(SHORT, path, urdf))
 
     return read
 
@@ -59,7 +65,7 @@ def read_import_record(data: bytes, folder: Path) -> None:
 
 @cache
 def log_samples() -> dict[str, bytes]:
-    """A sound input of every kind."""
+    """Return one valid input of each kind, by name."""
     with tempfile.TemporaryDirectory(prefix="corpus-") as scratch:
         folder = Path(scratch)
         bag = write_bag(folder / "log.bag", SHORT)

@@ -1,4 +1,4 @@
-"""Seeded damage of bytes, lines, numbers and nesting."""
+"""Seeded random damage to bytes, lines, numbers and nesting."""
 
 import re
 
@@ -33,11 +33,11 @@ _TOKENS = (
     b"$(touch out)",
 )
 _NUMBER = re.compile(rb"-?\d+(\.\d+)?")
-_MAX_DAMAGES = 4  # damages to one input
+_MAX_DAMAGES = 4  # changes of one input
 
 
 def mutated(data: bytes, seed: int) -> bytes:
-    """`data` after one to four damages drawn with `seed`."""
+    """Return `data` after one to four random changes drawn with `seed`."""
     rng = np.random.default_rng(seed)
     for _ in range(rng.integers(1, _MAX_DAMAGES, endpoint=True)):
         change = _CHANGES[rng.integers(len(_CHANGES))]
@@ -57,12 +57,12 @@ def _flip(data: bytes, rng: np.random.Generator) -> bytes:
     return data[:offset] + bytes((damaged,)) + data[offset + 1 :]
 
 
-def _cut(data: bytes, rng: np.random.Generator) -> bytes:
+def _remove(data: bytes, rng: np.random.Generator) -> bytes:
     first, last = sorted((_offset(data, rng), _offset(data, rng)))
     return data[:first] + data[last:]
 
 
-def _end(data: bytes, rng: np.random.Generator) -> bytes:
+def _truncate(data: bytes, rng: np.random.Generator) -> bytes:
     return data[: _offset(data, rng)]
 
 
@@ -103,8 +103,8 @@ def _swap_lines(data: bytes, rng: np.random.Generator) -> bytes:
 
 _CHANGES = (
     _flip,
-    _cut,
-    _end,
+    _remove,
+    _truncate,
     _repeat,
     _insert,
     _other_number,

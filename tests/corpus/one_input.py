@@ -1,4 +1,4 @@
-"""Reads one hostile input in an empty folder and reports its effects."""
+"""Read one damaged input in an empty folder and report its effects."""
 
 import os
 import tempfile
@@ -12,13 +12,13 @@ from tests.corpus.readers import READERS
 
 @dataclass(frozen=True, slots=True)
 class InputVerdict:
-    """Effects of an input.
+    """Effects of reading an input.
 
     Attributes:
         error: kind and text of the error; empty if the input was read.
-        is_refused: whether the error is one that a person can act on.
+        is_refused: whether the error is a `TractionError`.
         seconds: CPU time.
-        strays: files that appeared outside the folder.
+        strays: files written outside the folder.
     """
 
     error: str
@@ -28,12 +28,12 @@ class InputVerdict:
 
     @property
     def is_sound(self) -> bool:
-        """Whether the input was read or refused, and nothing else happened."""
+        """Whether the input was read or refused without writing outside the folder."""
         return (not self.error or self.is_refused) and not self.strays
 
 
-def read(name: str, data: bytes) -> InputVerdict:
-    """Read `data` by the reader `name` in its own folder."""
+def read_input(name: str, data: bytes) -> InputVerdict:
+    """Read `data` with the reader `name` in its own folder."""
     with tempfile.TemporaryDirectory(prefix="corpus-") as scratch:
         outside = Path(scratch)
         folder = outside / "deep" / "down" / "here"

@@ -1,4 +1,4 @@
-"""A reader for every kind of input, as a function of bytes and a folder.
+"""Readers of every kind of input, as functions of bytes and a folder.
 
 A reader puts the bytes where they belong in the empty folder and reads them as the
 program does. It returns or raises a `TractionError`; anything else is a failure.
@@ -37,14 +37,14 @@ from ft_sensor.calibration.sensor_file import sensor_from_toml
 from ft_sensor.reading import StreamTiming
 from ft_sensor.serial_line.timestamps import SampleTimestamper
 from ft_sensor.vendors import ati, bota, optoforce, robotous
-from tests.corpus.copied_session import use_lines, use_names
+from tests.corpus.copied_session import check_lines, check_names
 from tests.corpus.logs import (
+    log_reader,
     read_import_record,
-    read_log,
     read_message,
     read_urdf_bytes,
 )
-from tests.corpus.used_session import use
+from tests.corpus.used_session import run_commands
 from wam.bus.decoder import BusReader
 from wam.bus.frames import (
     FrameError,
@@ -79,7 +79,7 @@ _TIMING = StreamTiming(1_250_000.0, 803_000, _WRAP, 1000.0, 50_000_000, 37)
 
 
 def _session(folder: Path, name: str, data: bytes, journal: bytes = b"") -> None:
-    """Put a session with one hostile file into `folder`, inspect and recover it."""
+    """Write a session with one damaged file into `folder`, inspect and recover it."""
     path = folder / "sessions" / SESSION
     for below in ("trials", "rejected", "faults"):
         (path / below).mkdir(parents=True)
@@ -107,7 +107,7 @@ def _settings(name: str) -> Callable[[bytes, Path], None]:
 
 
 def _text(parse: Callable[[str], object]) -> Callable[[bytes, Path], None]:
-    """A reader of a text that another file holds or that was read as UTF-8."""
+    """Return a reader that decodes its bytes as UTF-8 and parses the text."""
     return lambda data, _: parse(data.decode(errors="replace"))
 
 
@@ -117,12 +117,12 @@ def _compensate(text: str) -> None:
     build_compensation(rig, text, is_simulated=True)
 
 
-def _table(name: str, **stated: Any) -> Callable[[bytes, Path], None]:
-    """A reader of a table whose layout is stated as for `load_tables`."""
+def _table(name: str, **layout: Any) -> Callable[[bytes, Path], None]:
+    """Return a reader of a table with the given options of `load_tables`."""
 
     def read(data: bytes, folder: Path) -> None:
         (folder / name).write_bytes(data)
-        load_tables([folder / name], **stated)
+        load_tables([folder / name], **layout)
 
     return read
 
@@ -131,7 +131,7 @@ PACKAGED = b"t [s],v_t [m/s],F_n [N],F_t [N]\n0,0.1,2,1\n0.1,0.1,2,1\n0.2,0.1,2,
 
 
 def _package(data: bytes, folder: Path) -> None:
-    """Read `data` as the description of a folder with one sound table."""
+    """Read `data` as the data package of a folder with one valid table."""
     (folder / "T01.csv").write_bytes(PACKAGED)
     (folder / "datapackage.json").write_bytes(data)
     for path in (folder, folder / "T01.csv"):
@@ -190,7 +190,7 @@ def _bus_log(data: bytes, _: Path) -> None:
 
 
 def _frames(data: bytes, _: Path) -> None:
-    """Decode frames of every length in `data` by every decoder."""
+    """Decode `data` as frames of every length with every decoder."""
     for start in range(0, len(data), 10):
         split_id(int.from_bytes(data[start : start + 2], "little") & 0x7FF)
         for decode in _DECODERS:
@@ -202,7 +202,7 @@ def _frames(data: bytes, _: Path) -> None:
 
 
 def _sensor(data: bytes, _: Path) -> None:
-    """Read `data` in pieces as the stream of each sensor kind; date the readings."""
+    """Read `data` in pieces as a stream of each sensor kind, with timestamps."""
     scanners = (
         bota.scanner(_RANGES),
         robotous.scanner(lambda: 1000.0),
@@ -225,16 +225,16 @@ def _trial(data: bytes, folder: Path) -> None:
     """Read, verify and recover `data` as a trial file."""
     path = folder / "T01.mcap"
     path.write_bytes(data)
-    for look in (TrialReader.cycles, TrialReader.topic_counts):
+    for read in (TrialReader.cycles, TrialReader.topic_counts):
         with contextlib.suppress(TrialFileError):
-            look(TrialReader(path))
+            read(TrialReader(path))
     recovery = recover_file(path)
     TrialReader(recovery.path).cycles()
 
 
-def _used(name: str) -> Callable[[bytes, Path], None]:
-    """A reader that puts its bytes into a whole session and uses the session."""
-    return lambda data, folder: use(name, data, folder)
+def _session_commands(name: str) -> Callable[[bytes, Path], None]:
+    """Return a reader that runs commands on a session with its bytes as `name`."""
+    return lambda data, folder: run_commands(name, data, folder)
 
 
 READERS: dict[str, Callable[[bytes, Path], None]] = {
@@ -270,16 +270,16 @@ READERS: dict[str, Callable[[bytes, Path], None]] = {
     "mcap": _trial,
     "arm-model": _text(load_constants),
     "lock": lambda data, folder: _session(folder, ".lock", data),
-    "used-sidecar": _used("trials/T01.json"),
-    "used-rejected": _used("rejected/T01a.json"),
-    "used-session": _used("/session.json"),
-    "used-journal": _used("/events.jsonl"),
-    "used-mcap": _used("trials/T01.mcap"),
-    "journal-lines": use_lines,
-    "session-names": use_names,
-    "log-bag": read_log("log.bag"),
-    "log-mcap": read_log("log.mcap"),
-    "log-db3": read_log("log.db3"),
+    "used-sidecar": _session_commands("trials/T01.json"),
+    "used-rejected": _session_commands("rejected/T01a.json"),
+    "used-session": _session_commands("/session.json"),
+    "used-journal": _session_commands("/events.jsonl"),
+    "used-mcap": _session_commands("trials/T01.mcap"),
+    "journal-lines": check_lines,
+    "session-names": check_names,
+    "log-bag": log_reader("log.bag"),
+    "log-mcap": log_reader("log.mcap"),
+    "log-db3": log_reader("log.db3"),
     "urdf": read_urdf_bytes,
     "message": read_message,
     "import-record": read_import_record,
@@ -298,5 +298,5 @@ EVENTS = (
 
 
 def journal_of(*events: dict[str, object]) -> bytes:
-    """Journal of events, as bytes."""
+    """Return the journal of `events` as bytes."""
     return b"".join(journal_line(event, n) for n, event in enumerate(events, 1))

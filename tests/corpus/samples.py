@@ -1,4 +1,4 @@
-"""One small sound input of each kind, from which mutations start."""
+"""One small valid input of each kind, to be mutated."""
 
 import hashlib
 import io
@@ -61,7 +61,7 @@ _LOG = b"""\
 (1800000000.000400) can0 463#00C000
 (1800000000.000900) can0 405#AA80000000000000
 """
-# Tables as other programs write them.
+# Tables written by other programs.
 _GERMAN = """\
 t [s];v_t [mm/s];F_n [N];F_t [N]
 0,000;100,0;13,25;0,89
@@ -193,16 +193,16 @@ def _sums() -> bytes:
 
 
 def _frames() -> bytes:
-    words = (
+    payloads = (
         encode_force((1.0, 2.0, 3.0)),
         encode_position(-5),
         encode_torques([9] * 4),
     )
-    return b"".join(b"\x63\x04" + word.ljust(8, b"\0") for word in words)
+    return b"".join(b"\x63\x04" + payload.ljust(8, b"\0") for payload in payloads)
 
 
 def _stream() -> bytes:
-    """20 ms of the stream of each sensor kind."""
+    """Return 20 ms of the stream of each sensor kind."""
     data = bytearray()
     for kind in SERIAL_KINDS:
         stream = make_stream(SensorChoice(kind), lambda _: (1.0,) * 6, None, 0)
@@ -212,7 +212,7 @@ def _stream() -> bytes:
 
 @cache
 def samples() -> dict[str, bytes]:
-    """A sound input for every reader, by name."""
+    """Return a valid input for every reader, by name."""
     shipped = resources.files("experiments.data")
     payload = payload_of(_TOOL)
     frame = TerrainFrame(0.1, 0.2, (0.7, 0.1, 0.12), 0.45)

@@ -1,4 +1,4 @@
-"""Inputs that did harm once, or might, are read or refused quickly."""
+"""Inputs that once caused a failure, or might, are read or refused quickly."""
 
 import json
 import os
@@ -20,9 +20,9 @@ from ft_sensor.calibration.files import (
 from ft_sensor.payload import TerrainFrame
 from tests.attacks.parameters import parameters
 from tests.corpus.damaged import damage_attacks
+from tests.corpus.one_input import read_input
 from tests.corpus.readers import READERS
 from tests.corpus.samples import samples
-from tests.corpus.trial import read
 
 CORPUS = Path(__file__).parents[1] / "data" / "corpus"
 ROOT = Path(__file__).parents[2]
@@ -30,23 +30,22 @@ SECONDS = 2.0  # of CPU
 MEMORY = 200 * 2**20
 FRAME = TerrainFrame(0.1, 0.2, (0.7, 0.1, 0.12), 0.45)
 
-# Reads every file of the corpus under a limit of its address space; one line each.
+# Reads every file of the corpus with limited address space; prints a line per file.
 READER = """
 import json, resource, sys
 from pathlib import Path
-from tests.corpus.trial import read
+from tests.corpus.one_input import read_input
 pages = int(Path("/proc/self/statm").read_text().split()[0])
 limit = pages * resource.getpagesize() + int(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
 for path in sorted(Path(sys.argv[2]).iterdir()):
-    found = read(path.name.split(".")[0], path.read_bytes())
-    said = [path.name, found.is_sound, found.seconds, found.error]
-    print(json.dumps(said))
+    verdict = read_input(path.name.split(".")[0], path.read_bytes())
+    print(json.dumps([path.name, verdict.is_sound, verdict.seconds, verdict.error]))
 """
 
 
 @pytest.mark.slow
-def test_no_file_of_the_corpus_is_harmful():
+def test_every_file_of_the_corpus_is_read_or_refused_quickly():
     done = subprocess.run(
         [sys.executable, "-c", READER, str(MEMORY), str(CORPUS)],
         cwd=ROOT,
@@ -68,9 +67,9 @@ def test_every_file_of_the_corpus_has_a_reader():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", READERS)
-def test_a_sound_input_is_read(name):
-    found = read(name, samples()[name])
-    assert (found.error, found.strays) == ("", ())
+def test_a_valid_input_is_read(name):
+    verdict = read_input(name, samples()[name])
+    assert (verdict.error, verdict.strays) == ("", ())
 
 
 @pytest.mark.parametrize("row", parameters(damage_attacks()))

@@ -1,4 +1,4 @@
-"""The whole program refuses oversized files in little memory.
+"""The whole program refuses oversized files without much memory.
 
 Sparse files take no disk; the memory of a command is read from the kernel.
 """
@@ -17,8 +17,8 @@ from tests.corpus.used_session import lay_out
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(180)]
 ROOT = Path(__file__).parents[2]
 MEMORY = 300 * 2**20
-# A process reports its peak memory at its end: the figure that the kernel gives to its
-# parent is never less than the parent's own.
+# A process writes its peak memory at exit: the value that the kernel reports to the
+# parent is never below the parent's own peak.
 PEAK = """import atexit, os, re, sys
 
 def peak():
@@ -47,8 +47,8 @@ COMMANDS = (
 
 
 @dataclass(frozen=True)
-class Ended:
-    """How a command ended, and its peak memory [bytes]."""
+class CommandResult:
+    """Exit code, output and peak memory [bytes] of a command."""
 
     code: int
     text: str
@@ -68,11 +68,11 @@ def run(*arguments, cwd, code=START):
             env={**os.environ, **more},
             check=False,
         )
-    return Ended(done.returncode, log.read_text(), int(peak.read_text()) * 1024)
+    return CommandResult(done.returncode, log.read_text(), int(peak.read_text()) * 1024)
 
 
 def sparse(path, size):
-    """Extend `path` to `size` bytes by a hole."""
+    """Extend `path` to `size` bytes without using disk space."""
     with path.open("ab") as file:
         file.truncate(size)
 
@@ -87,19 +87,19 @@ def test_an_oversized_session_file_is_not_read(data, name):
     path = next(p for p in data.rglob("*") if str(p).endswith(name))
     sparse(path, 3 * 2**30)
     for command in COMMANDS:
-        ended = run(*command, "--data", data, cwd=data.parent)
-        assert ended.code in {0, 2, 6}, ended.text
-        assert ended.memory < MEMORY, (command, ended)
+        result = run(*command, "--data", data, cwd=data.parent)
+        assert result.code in {0, 2, 6}, result.text
+        assert result.memory < MEMORY, (command, result)
 
 
 def test_an_oversized_partial_file_is_not_recovered(data):
     path = next(data.rglob("trials")) / "T03.mcap.partial"
     path.touch()
     sparse(path, 3 * 2**30)
-    ended = run("recover", path, cwd=data.parent)
-    assert ended.code == 6
-    assert "the limit is 67108864" in ended.text
-    assert ended.memory < MEMORY
+    result = run("recover", path, cwd=data.parent)
+    assert result.code == 6
+    assert "the limit is 67108864" in result.text
+    assert result.memory < MEMORY
 
 
 def write_bomb(path):
@@ -126,20 +126,20 @@ TABLES = {
 @pytest.mark.parametrize("name", TABLES)
 def test_a_table_beyond_its_limits_is_refused(tmp_path, name):
     TABLES[name](tmp_path / name)
-    ended = run("fit", tmp_path / name, "--to", tmp_path / "out", cwd=tmp_path)
-    assert ended.code == 2, ended.text
-    assert ended.memory < MEMORY, ended
+    result = run("fit", tmp_path / name, "--to", tmp_path / "out", cwd=tmp_path)
+    assert result.code == 2, result.text
+    assert result.memory < MEMORY, result
 
 
-def test_the_largest_table_is_read_in_little_memory(tmp_path):
+def test_the_largest_table_is_read_within_the_memory_limit(tmp_path):
     path = tmp_path / "large.csv"
     count = 950_000
     rows = (b"%d.25,0.125,2.5,1.5\n" % number for number in range(count))
     path.write_bytes(b"t [s],v_t,F_n,F_t\n" + b"".join(rows))
     assert 22_000_000 < path.stat().st_size < 24_000_000
-    ended = run(path, cwd=tmp_path, code=READ)
-    assert ended.text.split() == [str(count)]
-    assert ended.memory < MEMORY
+    result = run(path, cwd=tmp_path, code=READ)
+    assert result.text.split() == [str(count)]
+    assert result.memory < MEMORY
 
 
 DATABASES = {
@@ -156,22 +156,22 @@ def test_a_database_beyond_its_limits_is_refused(tmp_path, name):
     table.write_bytes(HEADER + b"0,0.1,2,1\n" * 200)
     DATABASES[name](tmp_path / "terrains.json")
     database = ("--terrain-db", tmp_path / "terrains.json")
-    ended = run("identify", table, *database, cwd=tmp_path)
-    assert ended.code == 2, ended.text
-    assert ended.memory < MEMORY, ended
+    result = run("identify", table, *database, cwd=tmp_path)
+    assert result.code == 2, result.text
+    assert result.memory < MEMORY, result
 
 
 def test_a_journal_with_too_many_events_is_refused(data):
     path = next(data.rglob("events.jsonl"))
     path.write_bytes(b"{}\n" * (4 * 2**20 // 3))
-    ended = run("verify", "--all", "--data", data, cwd=data.parent)
-    assert ended.code == 6
-    assert "more than 50000 lines" in ended.text
-    assert ended.memory < MEMORY
+    result = run("verify", "--all", "--data", data, cwd=data.parent)
+    assert result.code == 6
+    assert "more than 50000 lines" in result.text
+    assert result.memory < MEMORY
 
 
 def test_oversized_settings_are_not_read(tmp_path):
     sparse(tmp_path / "rig.toml", 3 * 2**30)
-    ended = run("status", "--config", tmp_path / "rig.toml", cwd=tmp_path)
-    assert ended.code == 2
-    assert ended.memory < MEMORY
+    result = run("status", "--config", tmp_path / "rig.toml", cwd=tmp_path)
+    assert result.code == 2
+    assert result.memory < MEMORY

@@ -131,7 +131,7 @@ def test_reading_ends_at_chunks_that_unpack_too_large(tmp_path):
 
 
 def test_chunks_may_unpack_up_to_the_limit(tmp_path):
-    """Twelve of 16 MiB each; zeros behind them make the file large enough."""
+    """Twelve chunks of 16 MiB; trailing zeros make the file large enough for them."""
     content = b"\x99" + (16 * MIB - 9).to_bytes(8, "little") + bytes(16 * MIB - 9)
     data = with_chunk(zstandard.compress(content), 16 * MIB)
     chunk = span_of(data, CHUNK)
@@ -260,7 +260,7 @@ def test_an_npz_is_limited_by_its_unpacked_size(tmp_path):
 # --- terrain databases ----------------------------------------------------------------
 
 
-def stored(path, *, terrains=1, points=2):
+def write_database(path, *, terrains=1, points=2):
     """Write a database of `terrains` terrains, with `points` speeds."""
     content = json.loads(samples()["database"])
     content["axes"]["v_t"] = [0.1 * k for k in range(points)]
@@ -274,7 +274,7 @@ def stored(path, *, terrains=1, points=2):
 
 @pytest.mark.parametrize("most", [{"terrains": 200}, {"points": 400}])
 def test_a_database_of_the_largest_size_is_read(tmp_path, most):
-    loaded = database.load(stored(tmp_path / "terrains.json", **most))
+    loaded = database.load(write_database(tmp_path / "terrains.json", **most))
     assert len(loaded.terrains) == most.get("terrains", 1)
 
 
@@ -283,12 +283,12 @@ def test_a_database_of_the_largest_size_is_read(tmp_path, most):
 )
 def test_a_database_beyond_the_largest_size_is_refused(tmp_path, more, why):
     with pytest.raises(SettingsError, match=why):
-        database.load(stored(tmp_path / "terrains.json", **more))
+        database.load(write_database(tmp_path / "terrains.json", **more))
 
 
 @pytest.mark.parametrize(("size", "is_read"), [(6_000_000, True), (6_000_001, False)])
 def test_a_database_may_have_its_size_limit(tmp_path, size, is_read):
-    path = stored(tmp_path / "terrains.json")
+    path = write_database(tmp_path / "terrains.json")
     path.write_text(path.read_text().ljust(size))
     if is_read:
         assert database.load(path).terrains

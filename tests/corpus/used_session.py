@@ -1,4 +1,4 @@
-"""A session of two kept trials and a rejected one, used while one file is hostile."""
+"""Run commands on a session of two kept and one rejected trial with a damaged file."""
 
 import contextlib
 import hashlib
@@ -29,12 +29,12 @@ COMMANDS = (
 
 
 class HalfDoneError(Exception):
-    """A command has left inconsistent files, or has ended as a bug."""
+    """A command left inconsistent files or ended with a bug."""
 
 
 @cache
 def session_files() -> dict[str, bytes]:
-    """Files of the data folder of the session, by their path below that folder."""
+    """Return the content of the session's files by their path in the data folder."""
     with tempfile.TemporaryDirectory(prefix="corpus-") as scratch:
         data = Path(scratch)
         folder = create_session(data, "TF", is_simulated=True, utc_ns=1_800 * 10**15)
@@ -53,7 +53,7 @@ def session_files() -> dict[str, bytes]:
 
 
 def session_file(name: str) -> bytes:
-    """Content of the file of the session whose path ends in `name`."""
+    """Return the content of the session file whose path ends in `name`."""
     (content,) = (c for path, c in session_files().items() if path.endswith(name))
     return content
 
@@ -72,7 +72,7 @@ def _record(journal: Journal, name: TrialName, verdict: Event) -> None:
 
 
 def lay_out(folder: Path) -> Path:
-    """Write the data with the session into `folder`; the same folder."""
+    """Write the session into the data folder `folder`; return `folder`."""
     for name, content in session_files().items():
         target = folder / name
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -80,11 +80,11 @@ def lay_out(folder: Path) -> Path:
     return folder
 
 
-def use(name: str, data: bytes, folder: Path) -> None:
-    """Run commands on the session, with `data` in place of its file `name`.
+def run_commands(name: str, data: bytes, folder: Path) -> None:
+    """Run commands on the session, with `data` as the content of its file `name`.
 
     Raises:
-        HalfDoneError: a command ended as a bug, or recordings and sidecars disagree.
+        HalfDoneError: a command ended with a bug, or recordings and sidecars disagree.
     """
     for path, content in session_files().items():
         target = folder / path
@@ -92,18 +92,18 @@ def use(name: str, data: bytes, folder: Path) -> None:
         target.write_bytes(data if path.endswith(name) else content)
     before = _sums(folder)
     for command in COMMANDS:
-        printed(*command)
+        run_command(*command)
         if not name.endswith(".mcap") and _sums(folder) != before:
-            raise HalfDoneError(f"{command[0]} lost or doubled a recording")
+            raise HalfDoneError(f"{command[0]} lost or duplicated a recording")
         if name.endswith(".json"):
             _check_pairs(folder, command[0])
 
 
-def printed(*command: str) -> tuple[int, str]:
-    """Exit code of a command and its output, or its errors if there is none.
+def run_command(*command: str) -> tuple[int, str]:
+    """Return the exit code of a command and its output, or its errors if none.
 
     Raises:
-        HalfDoneError: the command ended as a bug.
+        HalfDoneError: the command ended with a bug.
     """
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
@@ -114,7 +114,7 @@ def printed(*command: str) -> tuple[int, str]:
 
 
 def _sums(folder: Path) -> list[str]:
-    """Checksums of all trial files."""
+    """Return the checksums of all trial files."""
     paths = folder.rglob("*.mcap")
     return sorted(hashlib.sha256(path.read_bytes()).hexdigest() for path in paths)
 
@@ -126,4 +126,4 @@ def _check_pairs(folder: Path, command: str) -> None:
         recordings = {path.stem for path in files if path.suffix == ".mcap"}
         sidecars = {path.stem for path in files if path.suffix == ".json"}
         if recordings != sidecars:
-            raise HalfDoneError(f"{command} left {recordings} and {sidecars} apart")
+            raise HalfDoneError(f"{command} left {recordings} without {sidecars}")

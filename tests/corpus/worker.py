@@ -1,7 +1,7 @@
-"""Reads mutations in a process of limited memory: `python -m tests.corpus.worker`.
+"""Read mutations in a process of limited memory: `python -m tests.corpus.worker`.
 
-Arguments: kind, first seed, count. Standard output has a line of JSON before each
-input, and one after each harmful input.
+Arguments: kind, first seed, count. Prints a line of JSON before each input, and one
+after each input that caused a failure.
 """
 
 import faulthandler
@@ -11,30 +11,30 @@ import sys
 from pathlib import Path
 
 from tests.corpus.mutations import mutated
+from tests.corpus.one_input import read_input
 from tests.corpus.samples import samples
-from tests.corpus.trial import read
 
 MEMORY = 300 * 2**20  # bytes of address space in addition to the libraries
-LONGEST = 10.0  # s; beyond it an input hangs
+TIMEOUT = 10.0  # s per input
 
 
 def main(kind: str, seeds: range) -> None:
-    """Read the mutations `seeds` of a kind."""
-    sound = samples()[kind]
-    read(kind, sound)  # imports must not count as memory of an input
+    """Read the mutations of a kind with these seeds; print failures."""
+    valid = samples()[kind]
+    read_input(kind, valid)  # imports must not count towards the memory limit
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     limit = pages * resource.getpagesize() + MEMORY
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
     for seed in seeds:
-        say({"seed": seed})
-        faulthandler.dump_traceback_later(LONGEST, exit=True)
-        verdict = read(kind, mutated(sound, seed))
+        print_json({"seed": seed})
+        faulthandler.dump_traceback_later(TIMEOUT, exit=True)
+        verdict = read_input(kind, mutated(valid, seed))
         faulthandler.cancel_dump_traceback_later()
         if not verdict.is_sound:
-            say({"error": verdict.error[:300], "strays": verdict.strays})
+            print_json({"error": verdict.error[:300], "strays": verdict.strays})
 
 
-def say(value: dict[str, object]) -> None:
+def print_json(value: dict[str, object]) -> None:
     print(json.dumps(value), flush=True)  # noqa: T201
 
 

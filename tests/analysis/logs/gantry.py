@@ -1,6 +1,6 @@
-"""Logs of a robot of four joints that rubs a foot over the ground, and their truth.
+"""Logs of a four-joint robot that strokes the ground with its foot, and their truth.
 
-Written by another program's library (rosbags), so that readers are tested against it.
+Written with the library rosbags, so that readers are tested against another program.
 """
 
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from analysis.logs.request import ImportRequest
 
-NAMES = ("slide_y", "wrist", "slide_x", "slide_z")  # another order than the robot's
+NAMES = ("slide_y", "wrist", "slide_x", "slide_z")  # not the order of the URDF
 START_NS = 1_790_000_000_000_000_000
 URDF = """<?xml version="1.0"?>
 <robot name="gantry">
@@ -41,19 +41,19 @@ URDF = """<?xml version="1.0"?>
 
 
 @dataclass
-class Rubbing:
-    """A motion of the robot, and how it is recorded.
+class StrokeLog:
+    """A motion of the robot in strokes, and its recording.
 
     Attributes:
-        lag: how late the wrench is stamped [s].
-        mass: below the gauges [kg].
-        turn: of the wrist in the air [rad].
-        tilt: of it while pressed [rad].
-        bias: of the sensor.
-        sign: -1 where it reads the reaction.
-        strokes: number of them, each lifted at its end.
-        slope: of the ground along the path [rad].
-        heading: of the path about z [rad].
+        lag: delay of the wrench's stamps [s].
+        mass: mass below the gauges [kg].
+        turn: rotation of the wrist in the air [rad].
+        tilt: rotation of the wrist while pressed [rad].
+        bias: bias of the sensor [N, N m].
+        sign: -1 if the sensor reads the reaction.
+        strokes: number of strokes; the foot is lifted after each one.
+        slope: slope of the ground along the path [rad].
+        heading: direction of the path about z [rad].
     """
 
     lag: float = 0.010
@@ -70,23 +70,23 @@ class Rubbing:
     wrench_rate: float = 800.0
     bias_drift: float = 0.0
     seed: int = 1
-    axes: tuple = (0, 1, 2)  # order in which the sensor's axes are recorded
+    axes: tuple = (0, 1, 2)  # recorded order of the sensor's axes
     frame_id: str = "gauge"
     with_velocity: bool = False
     velocity_late: float = 0.0
     stamps: bool = True
-    clock_offset: float = 0.0  # of the stamps of the wrench [s]
-    clock_rate: float = 1.0  # of its stamps against the true time
-    stamp_rate: float = 1.0  # of all stamps against the true time
+    clock_offset: float = 0.0  # of the wrench's stamps [s]
+    clock_rate: float = 1.0  # of the wrench's stamps, 1 = true time
+    stamp_rate: float = 1.0  # of all stamps, 1 = true time
     lost: float = 0.0
     q_step: float = 2e-5
-    changes: tuple = ()  # of the list of (topic, receipt, message)
+    changes: tuple = ()  # functions applied to [(topic, receipt, message), ...]
     end: float = field(init=False)
 
     def __post_init__(self):
         self.end = 3.0 + 9.0 * self.strokes
 
-    # the motion: in the air to 2 s, down to 3 s, then strokes of 8 s, each lifted 1 s
+    # Motion: in the air until 2 s, down until 3 s, then strokes of 8 s, lifted for 1 s
     def speed(self, t):
         """Return the speed along the path [m/s]."""
         s = t - 3.0
@@ -108,7 +108,7 @@ class Rubbing:
         return np.stack([x, np.cross(z, x), z])
 
     def truth(self, t):
-        """Return v_t, F_t, F_n at instants."""
+        """Return (v_t, F_t, F_n) at times `t` [s]."""
         v = self.speed(t)
         on = (self.lifted(t) <= 0) & (t >= 3.0)
         F_n = np.where(on, 10.0 + 2.0 * np.sin(2 * np.pi * 0.7 * t), 0.0)
@@ -120,7 +120,7 @@ class Rubbing:
         return np.interp(t, grid, np.cumsum(steps) - steps)
 
     def joints(self, t):
-        """Return slide_x, slide_y, slide_z, wrist."""
+        """Return the positions of slide_x, slide_y, slide_z and wrist, shape (n, 4)."""
         from scipy.spatial.transform import Rotation
 
         axes = self.axes_of_ground()
@@ -155,19 +155,21 @@ class Rubbing:
         return load[:, order]
 
 
-def stated(rubbing: Rubbing, log: Path, urdf: Path, **options) -> ImportRequest:
-    """Return a request that states the truth of a log, except for `options`."""
-    x_T, _, z_T = rubbing.axes_of_ground()
-    starts = [3.0 + 9.0 * k for k in range(rubbing.strokes)]
+def import_request(
+    stroke_log: StrokeLog, log: Path, urdf: Path, **options
+) -> ImportRequest:
+    """Return a request with the true values of a log, changed by `options`."""
+    x_T, _, z_T = stroke_log.axes_of_ground()
+    starts = [3.0 + 9.0 * k for k in range(stroke_log.strokes)]
     values = {
         "foot": "foot",
         "sensor": "gauge",
         "acts": "ground-on-foot",
         "tare": (0.1, 0.6),
-        "mass": rubbing.mass,
+        "mass": stroke_log.mass,
         "along": x_T,
         "normal": z_T,
-        "lag": rubbing.lag,
+        "lag": stroke_log.lag,
         "trials": [(start, start + 8.0) for start in starts],
     }
     return ImportRequest(log, urdf, **(values | options))
@@ -179,23 +181,23 @@ def write_urdf(folder: Path) -> Path:
     return path
 
 
-def messages(rubbing: Rubbing, store, types):
+def messages(stroke_log: StrokeLog, store, types):
     """Return (topic, receipt [ns], message) in order of receipt."""
-    rng = np.random.default_rng(rubbing.seed + 1)
+    rng = np.random.default_rng(stroke_log.seed + 1)
     Header, Time, JointState, WrenchStamped, Wrench, Vector3 = types
     is_ros1 = "seq" in Header.__dataclass_fields__
 
     def header(t, frame, offset=0.0, rate=1.0):
-        at = (t * rate + offset) * rubbing.stamp_rate
-        ns = START_NS + round(at * 1e9) if rubbing.stamps else 0
+        at = (t * rate + offset) * stroke_log.stamp_rate
+        ns = START_NS + round(at * 1e9) if stroke_log.stamps else 0
         stamp = Time(sec=ns // 10**9, nanosec=ns % 10**9)
         more = {"seq": 0} if is_ros1 else {}
         return Header(stamp=stamp, frame_id=frame, **more)
 
-    t = np.arange(0.0, rubbing.end, 1.0 / rubbing.joint_rate)
-    q = rubbing.joints(t)[:, [1, 3, 0, 2]]
-    qd = np.gradient(rubbing.joints(t - rubbing.velocity_late), t, axis=0)
-    qd = qd[:, [1, 3, 0, 2]] if rubbing.with_velocity else np.zeros((len(t), 0))
+    t = np.arange(0.0, stroke_log.end, 1.0 / stroke_log.joint_rate)
+    q = stroke_log.joints(t)[:, [1, 3, 0, 2]]
+    qd = np.gradient(stroke_log.joints(t - stroke_log.velocity_late), t, axis=0)
+    qd = qd[:, [1, 3, 0, 2]] if stroke_log.with_velocity else np.zeros((len(t), 0))
     out = [
         (
             "/joint_states",
@@ -210,23 +212,25 @@ def messages(rubbing: Rubbing, store, types):
         )
         for at, row, speed in zip(t, q, qd, strict=True)
     ]
-    t = np.arange(0.0, rubbing.end, 1.0 / rubbing.wrench_rate)
-    wrench = rubbing.wrench(t)
-    kept = rng.random(len(t)) >= rubbing.lost
+    t = np.arange(0.0, stroke_log.end, 1.0 / stroke_log.wrench_rate)
+    wrench = stroke_log.wrench(t)
+    kept = rng.random(len(t)) >= stroke_log.lost
     for at, row in zip(t[kept], wrench[kept], strict=True):
-        received = np.ceil(at / 0.02) * 0.02 if rubbing.stamps else at + rubbing.lag
+        received = (
+            np.ceil(at / 0.02) * 0.02 if stroke_log.stamps else at + stroke_log.lag
+        )
         message = WrenchStamped(
             header=header(
-                at + rubbing.lag,
-                rubbing.frame_id,
-                rubbing.clock_offset,
-                rubbing.clock_rate,
+                at + stroke_log.lag,
+                stroke_log.frame_id,
+                stroke_log.clock_offset,
+                stroke_log.clock_rate,
             ),
             wrench=Wrench(Vector3(*row[:3]), Vector3(*row[3:])),
         )
         out.append(("/ft/wrench", START_NS + round(received * 1e9) + 900_000, message))
     out = sorted(out, key=lambda row: row[1])
-    for change in rubbing.changes:
+    for change in stroke_log.changes:
         out = change(out)
     return out
 
@@ -243,19 +247,19 @@ def types_of(store):
     return [store.types[name] for name in names]
 
 
-def write_bag(path: Path, rubbing: Rubbing, compression=None) -> Path:
+def write_bag(path: Path, stroke_log: StrokeLog, compression=None) -> Path:
     """Write a ROS 1 bag."""
     store = get_typestore(Stores.ROS1_NOETIC)
     writer = rosbag1.Writer(path)
     if compression:
         writer.set_compression(rosbag1.Writer.CompressionFormat[compression])
     with writer:
-        _write(writer, store, rubbing, store.serialize_ros1)
+        _write(writer, store, stroke_log, store.serialize_ros1)
     return path
 
 
-def write_bag2(path: Path, rubbing: Rubbing, plugin="MCAP", mode=None) -> Path:
-    """Write a folder of rosbag2."""
+def write_bag2(path: Path, stroke_log: StrokeLog, plugin="MCAP", mode=None) -> Path:
+    """Write a ROS 2 bag, a folder."""
     store = get_typestore(Stores.ROS2_HUMBLE)
     storage = rosbag2.StoragePlugin[plugin]
     writer = rosbag2.Writer(path, version=9, storage_plugin=storage)
@@ -263,13 +267,13 @@ def write_bag2(path: Path, rubbing: Rubbing, plugin="MCAP", mode=None) -> Path:
         modes = rosbag2.CompressionMode
         writer.set_compression(modes[mode], rosbag2.CompressionFormat.ZSTD)
     with writer:
-        _write(writer, store, rubbing, store.serialize_cdr)
+        _write(writer, store, stroke_log, store.serialize_cdr)
     return path
 
 
-def _write(writer, store, rubbing, serialize):
+def _write(writer, store, stroke_log, serialize):
     connections = {}
-    for topic, received_ns, message in messages(rubbing, store, types_of(store)):
+    for topic, received_ns, message in messages(stroke_log, store, types_of(store)):
         kind = message.__msgtype__
         if topic not in connections:
             connections[topic] = writer.add_connection(topic, kind, typestore=store)

@@ -8,7 +8,7 @@ import pytest
 from acquisition.errors import SettingsError
 from analysis.logs.importing import import_log
 from analysis.logs.opening import log_files, open_log
-from tests.analysis.logs.gantry import Rubbing, stated, write_bag2, write_urdf
+from tests.analysis.logs.gantry import StrokeLog, import_request, write_bag2, write_urdf
 
 WRENCH = "/ft/wrench"
 
@@ -17,11 +17,11 @@ WRENCH = "/ft/wrench"
 def imported(tmp_path):
     urdf = write_urdf(tmp_path)
 
-    def make(rubbing, **options):
+    def make(stroke_log, **options):
         log = tmp_path / "log"
         if not log.exists():
-            write_bag2(log, rubbing)
-        return import_log(stated(rubbing, log, urdf, **options))
+            write_bag2(log, stroke_log)
+        return import_log(import_request(stroke_log, log, urdf, **options))
 
     return make
 
@@ -40,9 +40,9 @@ def changing(topic, change):
     return (changed,)
 
 
-def worst_F_n(found, rubbing):
+def worst_F_n(found, stroke_log):
     (trial,) = found.trials
-    v_t, _, F_n = rubbing.truth(trial.t + trial.start)
+    v_t, _, F_n = stroke_log.truth(trial.t + trial.start)
     sound = np.isfinite(trial.traction[:, 2]) & (v_t > 0.03)
     return float(np.abs(trial.traction[:, 2] - F_n)[sound].max())
 
@@ -51,8 +51,10 @@ def test_nan_velocities_leave_positions_usable(imported):
     def change(_, message):
         message.velocity[:] = np.nan
 
-    rubbing = Rubbing(with_velocity=True, changes=changing("/joint_states", change))
-    found = imported(rubbing)
+    stroke_log = StrokeLog(
+        with_velocity=True, changes=changing("/joint_states", change)
+    )
+    found = imported(stroke_log)
     assert len(found.joints.q) == 6000
     assert any("6000 messages with invalid velocities" in w for w in found.warnings)
     assert found.trials[0].traction[:, 0].max() == pytest.approx(0.06, abs=1e-3)
@@ -64,26 +66,26 @@ def test_joint_states_of_zeros_are_reported_and_omitted(imported, rows):
         if count in rows:
             message.position[:] = 0.0
 
-    rubbing = Rubbing(changes=changing("/joint_states", change))
-    found = imported(rubbing)
+    stroke_log = StrokeLog(changes=changing("/joint_states", change))
+    found = imported(stroke_log)
     assert any(
         f"{len(rows)} messages with all joints at zero" in w and "6.200" in w
         for w in found.warnings
     )
     assert found.trials[0].traction[:, 0].max() == pytest.approx(0.06, abs=1e-3)
-    assert worst_F_n(found, rubbing) < 0.3
+    assert worst_F_n(found, stroke_log) < 0.3
 
 
 def test_joints_resting_at_zero_are_accepted(imported):
-    rubbing = Rubbing()
-    real = rubbing.joints
+    stroke_log = StrokeLog()
+    real = stroke_log.joints
 
     def at_zero(t):
         q = real(t)
         return q - q[0]
 
-    rubbing.joints = at_zero
-    found = imported(rubbing)
+    stroke_log.joints = at_zero
+    found = imported(stroke_log)
     assert not any("at zero" in w for w in found.warnings)
 
 
@@ -92,9 +94,9 @@ def test_a_jump_of_a_joint_is_refused_with_its_time(imported):
         if count >= 3100:
             message.position[0] += 0.5
 
-    rubbing = Rubbing(changes=changing("/joint_states", change))
+    stroke_log = StrokeLog(changes=changing("/joint_states", change))
     with pytest.raises(SettingsError, match=r"jumps 6\.198 s after its first message"):
-        imported(rubbing)
+        imported(stroke_log)
 
 
 def test_a_constant_channel_is_omitted_and_reported(imported):
@@ -106,10 +108,10 @@ def test_a_constant_channel_is_omitted_and_reported(imported):
             message.wrench.force = held[0].force
             message.wrench.torque = held[0].torque
 
-    rubbing = Rubbing(changes=changing(WRENCH, change))
-    found = imported(rubbing)
+    stroke_log = StrokeLog(changes=changing(WRENCH, change))
+    found = imported(stroke_log)
     assert any("unchanged reading for 2.50 s from 5.01" in w for w in found.warnings)
-    assert worst_F_n(found, rubbing) < 0.3
+    assert worst_F_n(found, stroke_log) < 0.3
     (trial,) = found.trials
     at = trial.t + trial.start
     assert np.isnan(trial.traction[(at > 5.05) & (at < 7.4), 1]).all()
@@ -120,39 +122,39 @@ def test_nan_readings_are_counted(imported):
         if count % 7 == 3:
             message.wrench.force.x = np.nan
 
-    rubbing = Rubbing(changes=changing(WRENCH, change))
-    found = imported(rubbing)
+    stroke_log = StrokeLog(changes=changing(WRENCH, change))
+    found = imported(stroke_log)
     text = "9600 messages, 8229 used; left out: 1371 with invalid readings"
     assert found.wrench.clock.text == text
     assert any(text in w for w in found.warnings)
-    assert worst_F_n(found, rubbing) < 0.3
+    assert worst_F_n(found, stroke_log) < 0.3
 
 
 def test_without_usable_messages_the_causes_are_counted(imported):
     def change(_, message):
         message.position[:] = np.nan
 
-    rubbing = Rubbing(changes=changing("/joint_states", change))
+    stroke_log = StrokeLog(changes=changing("/joint_states", change))
     with pytest.raises(
         SettingsError,
         match=r"0 usable messages of 6000 .* \(6000 with invalid positions",
     ):
-        imported(rubbing)
+        imported(stroke_log)
 
 
 @pytest.mark.parametrize("clock", [None, "receipt"])
 def test_a_duplicated_recording_is_reported(imported, tmp_path, clock):
-    imported(Rubbing())
+    imported(StrokeLog())
     (file,) = (tmp_path / "log").glob("*.mcap")
     file.with_name("copy.mcap").write_bytes(file.read_bytes())
     with pytest.raises(SettingsError, match=r"copy.mcap and log.mcap hold the same"):
-        imported(Rubbing(), clock=clock)
+        imported(StrokeLog(), clock=clock)
 
 
 def database(tmp_path):
     """Return the file of a recording as rosbag2 writes it."""
     write_bag2(
-        tmp_path / "db3", Rubbing(joint_rate=100.0, wrench_rate=100.0), "SQLITE3"
+        tmp_path / "db3", StrokeLog(joint_rate=100.0, wrench_rate=100.0), "SQLITE3"
     )
     return next((tmp_path / "db3").glob("*.db3"))
 

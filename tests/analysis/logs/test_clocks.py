@@ -8,18 +8,18 @@ import pytest
 from acquisition.errors import SettingsError
 from analysis.logs.clocks import doubts_of_clock, fit_clock
 from analysis.logs.importing import import_log
-from tests.analysis.logs.gantry import Rubbing, stated, write_bag2, write_urdf
+from tests.analysis.logs.gantry import StrokeLog, import_request, write_bag2, write_urdf
 
 
 @pytest.fixture
 def imported(tmp_path):
     urdf = write_urdf(tmp_path)
 
-    def make(rubbing, **options):
+    def make(stroke_log, **options):
         log = tmp_path / "log"
         if not log.exists():
-            write_bag2(log, rubbing)
-        return import_log(stated(rubbing, log, urdf, **options))
+            write_bag2(log, stroke_log)
+        return import_log(import_request(stroke_log, log, urdf, **options))
 
     return make
 
@@ -30,42 +30,44 @@ def fastest(found):
 
 @pytest.mark.parametrize("rate", [0.5, 0.8, 2.0])
 def test_stamps_at_another_rate_are_refused_until_a_clock_is_stated(imported, rate):
-    rubbing = Rubbing(stamp_rate=rate)
+    stroke_log = StrokeLog(stamp_rate=rate)
     with pytest.raises(SettingsError, match=rf"run at {rate:g} times") as error:
-        imported(rubbing)
+        imported(stroke_log)
     assert "--clock receipt" in error.value.hint
-    assert fastest(imported(rubbing, clock="receipt")) == pytest.approx(0.06, abs=2e-3)
+    assert fastest(imported(stroke_log, clock="receipt")) == pytest.approx(
+        0.06, abs=2e-3
+    )
 
 
 @pytest.mark.slow
 def test_a_stated_clock_is_used_and_the_doubt_reported(imported):
-    rubbing = Rubbing(stamp_rate=0.8)
+    stroke_log = StrokeLog(stamp_rate=0.8)
     spans = [(3.0 * 0.8, 11.0 * 0.8)]
-    found = imported(rubbing, clock="stamp", trials=spans, tare=(0.1, 0.45))
+    found = imported(stroke_log, clock="stamp", trials=spans, tare=(0.1, 0.45))
     assert fastest(found) == pytest.approx(0.06 / 0.8, abs=2e-3)
     assert any("run at 0.8 times" in text for text in found.warnings)
 
 
 @pytest.mark.slow
 def test_a_sensor_clock_that_runs_fast_is_named_with_its_drift(imported):
-    rubbing = Rubbing(clock_rate=1.001)
+    stroke_log = StrokeLog(clock_rate=1.001)
     with pytest.raises(SettingsError, match=r"drift \+1000 ppm, 12 ms over the log"):
-        imported(rubbing)
-    found = imported(rubbing, clock="receipt", lag=0.0)
-    v_t, F_t, F_n = rubbing.truth(found.trials[0].t + found.trials[0].start)
+        imported(stroke_log)
+    found = imported(stroke_log, clock="receipt", lag=0.0)
+    v_t, F_t, F_n = stroke_log.truth(found.trials[0].t + found.trials[0].start)
     calm = v_t > 0.03
     rest = found.trials[0].traction[calm] - np.column_stack([v_t, F_t, F_n])[calm]
     assert np.sqrt(np.mean(rest[:, 2] ** 2)) < 0.15
 
 
 def test_offset_clocks_are_refused_with_both_remedies(imported):
-    rubbing = Rubbing(clock_offset=0.3)
+    stroke_log = StrokeLog(clock_offset=0.3)
     with pytest.raises(SettingsError, match="stamped 309 ms later") as error:
-        imported(rubbing)
+        imported(stroke_log)
     assert "Or state --lag 309." in error.value.hint
-    by_lag = imported(rubbing, lag=0.31)
+    by_lag = imported(stroke_log, lag=0.31)
     assert not any("two clocks" in text for text in by_lag.warnings)
-    v_t, _, F_n = rubbing.truth(by_lag.trials[0].t + by_lag.trials[0].start)
+    v_t, _, F_n = stroke_log.truth(by_lag.trials[0].t + by_lag.trials[0].start)
     rest = (by_lag.trials[0].traction[:, 2] - F_n)[v_t > 0.03]
     assert np.sqrt(np.mean(rest**2)) < 0.1
 
@@ -81,32 +83,32 @@ def test_a_clock_set_during_the_log_is_refused(imported, step):
             stamp.sec, stamp.nanosec = divmod(ns, 10**9)
         return rows
 
-    rubbing = Rubbing(changes=(change,))
+    stroke_log = StrokeLog(changes=(change,))
     with pytest.raises(SettingsError, match=rf"jump by {step * 1e3:.0f} ms"):
-        imported(rubbing)
+        imported(stroke_log)
     # no line leads from these stamps to the recorder, and it received in bursts
     with pytest.raises(SettingsError, match="which does not distinguish the messages"):
-        imported(rubbing, clock="receipt")
+        imported(stroke_log, clock="receipt")
 
 
 def test_a_large_clock_offset_is_reported(imported):
     with pytest.raises(SettingsError, match=r"stamped -18000\.0 s later"):
-        imported(Rubbing(clock_offset=-18_000.0))
+        imported(StrokeLog(clock_offset=-18_000.0))
 
 
 def test_without_stamps_the_clock_must_be_stated(imported):
-    rubbing = Rubbing(stamps=False)
+    stroke_log = StrokeLog(stamps=False)
     with pytest.raises(SettingsError, match="stamps of /joint_states are not set"):
-        imported(rubbing)
-    found = imported(rubbing, clock="receipt")
+        imported(stroke_log)
+    found = imported(stroke_log, clock="receipt")
     assert found.wrench.clock.by == "receipt"
     assert any("times of receipt, without its stamps" in w for w in found.warnings)
 
 
 def test_topics_without_common_time_are_refused_with_both_spans(imported):
-    rubbing = Rubbing(clock_offset=-18_000.0)
+    stroke_log = StrokeLog(clock_offset=-18_000.0)
     with pytest.raises(SettingsError, match=r"in time: the joints go from 0 to"):
-        imported(rubbing, clock="stamp")
+        imported(stroke_log, clock="stamp")
 
 
 @pytest.mark.parametrize("clock", [None, "receipt"])
@@ -118,7 +120,7 @@ def test_a_few_messages_without_a_stamp_are_omitted(imported, clock):
             message.header.stamp.sec = message.header.stamp.nanosec = 0
         return rows
 
-    found = imported(Rubbing(changes=(change,)), clock=clock)
+    found = imported(StrokeLog(changes=(change,)), clock=clock)
     left_out = [topic.clock.left_out for topic in (found.joints, found.wrench)]
     assert sum(counts.get("without a stamp", 0) for counts in left_out) == 3
 

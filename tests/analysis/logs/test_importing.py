@@ -6,9 +6,9 @@ import pytest
 from acquisition.errors import SettingsError
 from analysis.data.prepare import moving_average
 from analysis.logs.importing import import_log
-from tests.analysis.logs.gantry import Rubbing, stated, write_bag2, write_urdf
+from tests.analysis.logs.gantry import StrokeLog, import_request, write_bag2, write_urdf
 
-TURNED = Rubbing(turn=1.0)
+TURNED = StrokeLog(turn=1.0)
 
 
 @pytest.fixture(scope="module")
@@ -17,10 +17,10 @@ def written(tmp_path_factory):
     folder = tmp_path_factory.mktemp("logs")
     logs = {}
 
-    def write(rubbing, writer):
-        key = f"{rubbing} {vars(rubbing).keys()}"
+    def write(stroke_log, writer):
+        key = f"{stroke_log} {vars(stroke_log).keys()}"
         if key not in logs:
-            logs[key] = writer(folder / f"{len(logs)}", rubbing)
+            logs[key] = writer(folder / f"{len(logs)}", stroke_log)
         return logs[key]
 
     return write
@@ -31,9 +31,9 @@ def imported(tmp_path_factory, written):
     """Return a function that writes a log and imports it, its truth stated."""
     urdf = write_urdf(tmp_path_factory.mktemp("urdf"))
 
-    def make(rubbing, write=write_bag2, **options):
-        log = written(rubbing, write)
-        return import_log(stated(rubbing, log, urdf, **options))
+    def make(stroke_log, write=write_bag2, **options):
+        log = written(stroke_log, write)
+        return import_log(import_request(stroke_log, log, urdf, **options))
 
     return make
 
@@ -49,9 +49,9 @@ def check(found, name):
     return match
 
 
-def errors(trial, rubbing):
+def errors(trial, stroke_log):
     """Return rms of v_t [m/s], F_t and F_n [N], away from starts, stops, touch-down."""
-    v_t, F_t, F_n = rubbing.truth(trial.t + trial.start)
+    v_t, F_t, F_n = stroke_log.truth(trial.t + trial.start)
     sliding = (v_t > 0.01) & np.isfinite(trial.traction).all(axis=1)
     calm = moving_average(sliding.astype(float), 31) > 0.999
     assert calm.sum() > 500
@@ -60,16 +60,18 @@ def errors(trial, rubbing):
     return np.sqrt(np.mean(rest**2, axis=0))
 
 
-def is_right(trial, rubbing):
-    return bool((errors(trial, rubbing) < [1e-3, 0.05, 0.05]).all())
+def is_right(trial, stroke_log):
+    return bool((errors(trial, stroke_log) < [1e-3, 0.05, 0.05]).all())
 
 
 @pytest.mark.slow
 def test_velocity_and_forces_agree_with_the_truth(imported):
-    rubbing = Rubbing(strokes=2, turn=1.0, tilt=0.3, slope=0.1, heading=0.7, lost=0.003)
-    found = imported(rubbing)
+    stroke_log = StrokeLog(
+        strokes=2, turn=1.0, tilt=0.3, slope=0.1, heading=0.7, lost=0.003
+    )
+    found = imported(stroke_log)
     assert [trial.name for trial in found.trials] == ["T01", "T02"]
-    assert all(is_right(trial, rubbing) for trial in found.trials)
+    assert all(is_right(trial, stroke_log) for trial in found.trials)
     assert found.trials[0].series.incline_deg == pytest.approx(
         -np.degrees(0.1), abs=0.1
     )
@@ -77,14 +79,14 @@ def test_velocity_and_forces_agree_with_the_truth(imported):
 
 
 def test_checks_confirm_correct_statements(imported):
-    rubbing = Rubbing(turn=1.0, slope=0.1, heading=0.7)
-    found = imported(rubbing)
+    stroke_log = StrokeLog(turn=1.0, slope=0.1, heading=0.7)
+    found = imported(stroke_log)
     assert check(found, "tare").shown[0] < 0.02  # N that the free foot reads
     assert check(found, "mass").shown == pytest.approx([0.3], abs=0.005)
     assert check(found, "lag").shown == pytest.approx([10.0], abs=5.0)
     low, high = check(found, "lag").spread
     assert low <= 10.0 <= high
-    x_T, _, z_T = rubbing.axes_of_ground()
+    x_T, _, z_T = stroke_log.axes_of_ground()
     assert check(found, "normal").shown == pytest.approx(z_T, abs=2e-3)
     assert check(found, "direction").shown == pytest.approx(x_T, abs=2e-3)
     assert check(found, "clocks apart").shown == pytest.approx([9.4], abs=0.5)
@@ -122,14 +124,14 @@ def test_implausible_ground_forces_are_refused_with_the_failed_check(
     imported, options, words
 ):
     with pytest.raises(SettingsError, match=words):
-        imported(Rubbing(), **options)
+        imported(StrokeLog(), **options)
 
 
 def smooth():
     """Return a recording without starts and stops that show a lag."""
-    rubbing = Rubbing()
-    rubbing.speed = lambda t: 0.03 * np.sin(np.pi * np.clip(t - 3.5, 0, 7) / 7) ** 2
-    return rubbing
+    stroke_log = StrokeLog()
+    stroke_log.speed = lambda t: 0.03 * np.sin(np.pi * np.clip(t - 3.5, 0, 7) / 7) ** 2
+    return stroke_log
 
 
 @pytest.mark.slow
@@ -141,29 +143,29 @@ def test_a_lag_of_a_smooth_push_is_not_claimed(imported):
 
 @pytest.mark.slow
 def test_unexplained_onsets_are_counted(imported):
-    rubbing = Rubbing(strokes=3)
-    rubbing.truth = lambda t: (
-        rubbing.speed(t),
-        np.where(rubbing.lifted(t) <= 0, 3.0 + np.sin(7.3 * t), 0.0),
-        np.where(rubbing.lifted(t) <= 0, 10.0, 0.0),
+    stroke_log = StrokeLog(strokes=3)
+    stroke_log.truth = lambda t: (
+        stroke_log.speed(t),
+        np.where(stroke_log.lifted(t) <= 0, 3.0 + np.sin(7.3 * t), 0.0),
+        np.where(stroke_log.lifted(t) <= 0, 10.0, 0.0),
     )
-    how = check(imported(rubbing), "lag").how
+    how = check(imported(stroke_log), "lag").how
     assert "of F_t/F_n at" in how
     assert "% are needed" in how
 
 
 def test_forces_of_the_opposite_sign_are_refused_with_the_remedy(imported):
     with pytest.raises(SettingsError, match="have the opposite sign") as error:
-        imported(Rubbing(), acts="foot-on-ground")
+        imported(StrokeLog(), acts="foot-on-ground")
     assert "Give the other --acts" in error.value.hint
     with pytest.raises(SettingsError, match="cannot come from the ground"):
-        imported(Rubbing(), sensor="upright")
+        imported(StrokeLog(), sensor="upright")
 
 
 @pytest.mark.slow
 def test_a_reaction_force_sensor_is_read_with_the_matching_option(imported):
-    rubbing = Rubbing(sign=-1.0)
-    assert is_right(imported(rubbing, acts="foot-on-ground").trials[0], rubbing)
+    stroke_log = StrokeLog(sign=-1.0)
+    assert is_right(imported(stroke_log, acts="foot-on-ground").trials[0], stroke_log)
 
 
 @pytest.mark.slow
@@ -172,33 +174,33 @@ def test_a_reaction_force_sensor_is_read_with_the_matching_option(imported):
     [((1, 0, 2), "moments are -1.0 times"), ((2, 1, 0), "F_t exceeds F_n")],
 )
 def test_exchanged_axes_are_named(imported, axes, words):
-    found = imported(Rubbing(axes=axes))
+    found = imported(StrokeLog(axes=axes))
     assert any(words in text for text in found.warnings)
 
 
 def test_a_missing_weight_is_reported_with_its_effect(imported):
-    found = imported(Rubbing(tilt=0.3), mass=0.0)
+    found = imported(StrokeLog(tilt=0.3), mass=0.0)
     assert any("every 0.1 kg of mass" in text for text in found.warnings)
 
 
 @pytest.mark.slow
 def test_a_tare_may_be_six_numbers(imported):
-    rubbing = Rubbing()
-    found = imported(rubbing, tare=np.array(rubbing.bias))
-    assert is_right(found.trials[0], rubbing)
+    stroke_log = StrokeLog()
+    found = imported(stroke_log, tare=np.array(stroke_log.bias))
+    assert is_right(found.trials[0], stroke_log)
 
 
 def test_slow_joint_states_are_refused_unless_means_are_requested(imported):
-    rubbing = Rubbing(joint_rate=40.0)
+    stroke_log = StrokeLog(joint_rate=40.0)
     with pytest.raises(SettingsError, match=r"has 40\.0 Hz, slips need"):
-        imported(rubbing)
+        imported(stroke_log)
     assert any(
-        "slips are not seen" in w for w in imported(rubbing, is_slow=True).warnings
+        "slips are not seen" in w for w in imported(stroke_log, is_slow=True).warnings
     )
 
 
 def test_another_frame_in_the_header_is_named(imported):
-    found = imported(Rubbing(frame_id="tool0"))
+    found = imported(StrokeLog(frame_id="tool0"))
     assert any("frame 'tool0'; 'gauge' is used" in text for text in found.warnings)
 
 
@@ -218,5 +220,5 @@ def test_another_frame_in_the_header_is_named(imported):
 )
 def test_impossible_options_are_refused_with_a_remedy(imported, options, why):
     with pytest.raises(SettingsError, match=why) as error:
-        imported(Rubbing(), **options)
+        imported(StrokeLog(), **options)
     assert error.value.hint or "nearest" in str(error.value)

@@ -11,9 +11,9 @@ from acquisition.errors import SettingsError
 from acquisition.trial_file.unpacking import DamageError, Unpacker
 from analysis.logs.log_file import LARGEST_PART, LARGEST_RATIO
 from analysis.logs.opening import open_log
-from tests.analysis.logs.gantry import Rubbing, write_bag, write_bag2
+from tests.analysis.logs.gantry import StrokeLog, write_bag, write_bag2
 
-SHORT = Rubbing(joint_rate=100.0, wrench_rate=100.0)
+SHORT = StrokeLog(joint_rate=100.0, wrench_rate=100.0)
 WRENCH = "/ft/wrench"
 FORMATS = {
     "bag": (write_bag, ()),

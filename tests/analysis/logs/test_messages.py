@@ -10,9 +10,9 @@ from analysis.logs.messages import (
     read_joints,
     read_wrench,
 )
-from tests.analysis.logs.gantry import Rubbing, messages, types_of
+from tests.analysis.logs.gantry import StrokeLog, messages, types_of
 
-SHORT = Rubbing(joint_rate=20.0, wrench_rate=20.0, with_velocity=True)
+SHORT = StrokeLog(joint_rate=20.0, wrench_rate=20.0, with_velocity=True)
 
 
 @pytest.mark.parametrize(

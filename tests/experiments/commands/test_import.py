@@ -6,10 +6,10 @@ import shlex
 import pytest
 
 from analysis.tables.loading import load_tables
-from tests.analysis.logs.gantry import Rubbing, write_bag, write_bag2, write_urdf
+from tests.analysis.logs.gantry import StrokeLog, write_bag, write_bag2, write_urdf
 from tests.experiments.program import traction
 
-LOG = Rubbing(strokes=2)
+LOG = StrokeLog(strokes=2)
 
 
 @pytest.fixture(scope="module")
