@@ -1,4 +1,4 @@
-"""The effect of a trial agrees with differences, a closed form and scikit-learn."""
+"""The trial effect against finite differences, a closed form and scikit-learn."""
 
 import numpy as np
 import pytest
@@ -17,15 +17,15 @@ CHANGING = TrialNoise(LogLinearNoise(2))
 
 
 def drawn(trials, rows, seed=0):
-    """Return inputs, outputs and trials, `rows` rows of each trial."""
+    """Return random inputs, outputs and trial indices, `rows` rows per trial."""
     rng = np.random.default_rng(seed)
     X, y = rng.normal(size=(trials * rows, 2)), rng.normal(size=trials * rows)
     return X, y, TrialRows(np.repeat(np.arange(trials), rows))
 
 
 @pytest.mark.parametrize("kernel", [SE, Arcsine(2), Arcsine(2, as_printed=True)])
-@pytest.mark.parametrize("rows", [6, 38])  # the larger is inverted block by block
-def test_gradient_agrees_with_differences(kernel, rows):
+@pytest.mark.parametrize("rows", [6, 38])  # 38: inverted block by block
+def test_gradient_agrees_with_finite_differences(kernel, rows):
     X, y, trials = drawn(5, rows)
     likelihood = Likelihood(kernel, CHANGING, X, y, trials)
     shape = np.linspace(0.3, -0.2, len(kernel.names))
@@ -48,8 +48,8 @@ def test_likelihood_has_the_closed_form_of_a_mixed_model():
     C = SE.matrix(theta[:3], X, X) + 0.6**2 * np.eye(y.size)
     C += same * sc**2
     expected = multivariate_normal(np.zeros(y.size), C).logpdf(y)
-    found = Likelihood(SE, noise, X, y, trials).value(theta)
-    assert found == pytest.approx(expected, rel=1e-10)
+    lml = Likelihood(SE, noise, X, y, trials).value(theta)
+    assert lml == pytest.approx(expected, rel=1e-10)
 
 
 def test_likelihood_gradient_and_prediction_agree_with_scikit_learn():
@@ -58,35 +58,35 @@ def test_likelihood_gradient_and_prediction_agree_with_scikit_learn():
     from sklearn.gaussian_process.kernels import WhiteKernel as White
 
     X, y, trials = drawn(6, 8, seed=3)
-    any_, same = 1e9, 1e-3  # lengths: a column that does not count; one that must agree
-    known = np.column_stack([X, trials.trial])
-    smooth = ConstantKernel(1.3**2) * RBF([0.9, 1.7, any_])
-    level = ConstantKernel(0.6**2) * RBF([any_, any_, same])
-    theirs = GaussianProcessRegressor(
+    ignored, exact = 1e9, 1e-3  # length scales: no effect; inputs must be equal
+    inputs = np.column_stack([X, trials.trial])
+    smooth = ConstantKernel(1.3**2) * RBF([0.9, 1.7, ignored])
+    level = ConstantKernel(0.6**2) * RBF([ignored, ignored, exact])
+    reference = GaussianProcessRegressor(
         smooth + level + White(0.4**2), alpha=1e-300, optimizer=None
-    ).fit(known, y)
-    value, gradient = theirs.log_marginal_likelihood(
-        theirs.kernel_.theta, eval_gradient=True
+    ).fit(inputs, y)
+    value, gradient = reference.log_marginal_likelihood(
+        reference.kernel_.theta, eval_gradient=True
     )
     noise = TrialNoise(ConstantNoise())
     theta = np.log([1.3, 0.9, 1.7, 0.4, 0.6])
     lml, slope = Likelihood(SE, noise, X, y, trials)(theta)
     assert lml == pytest.approx(value, rel=1e-10)
-    # theirs: sf^2, l1, l2, -, sc^2, 3 of E, sn^2
-    indices_of_ours = [0, 1, 2, 8, 4]
-    factors = [2.0, 1.0, 1.0, 2.0, 2.0]  # ours is by sf, theirs by sf^2
-    np.testing.assert_allclose(slope, gradient[indices_of_ours] * factors, rtol=1e-6)
+    # scikit-learn's order: sf^2, l1, l2, (fixed), sc^2, (3 fixed lengths), sn^2
+    own_order = [0, 1, 2, 8, 4]
+    factors = [2.0, 1.0, 1.0, 2.0, 2.0]  # d/d log sf = 2 d/d log sf^2
+    np.testing.assert_allclose(slope, gradient[own_order] * factors, rtol=1e-6)
 
     at = np.random.default_rng(1).normal(size=(5, 2))
-    new = np.column_stack([at, np.full(5, 99.0)])  # a trial of its own
-    mean, sd = theirs.predict(new, return_std=True)
-    C = np.linalg.inv(theirs.kernel_(known))
-    ours, variance = GaussianProcess(
+    new = np.column_stack([at, np.full(5, 99.0)])  # a trial that is not in the data
+    mean, sd = reference.predict(new, return_std=True)
+    C = np.linalg.inv(reference.kernel_(inputs))
+    own_mean, variance = GaussianProcess(
         kernel=SE, noise=noise, theta=theta, X=X, alpha=C @ y, offset=0.0,
         centre=np.zeros(2), scale=np.ones(2), lml=0.0, starts=(), jitter=0.0,
         at_bound=(), trials=trials,
     ).predict(at)  # fmt: skip
-    np.testing.assert_allclose(ours, mean, rtol=1e-8)
+    np.testing.assert_allclose(own_mean, mean, rtol=1e-8)
     np.testing.assert_allclose(np.sqrt(variance), sd, rtol=1e-8)
 
 
@@ -97,7 +97,7 @@ def test_the_search_recovers_the_spread_between_trials():
     y += rng.normal(0, 0.3, y.size)
     model = fit_gp(X, y, SE, LEVEL, trials=trials)
     theta = dict(zip(("log_sn", "log_sc"), model.theta[3:], strict=True))
-    # 40 trials show a spread to 1/sqrt(80) = 11 %, 320 rows the noise to 4 %
+    # standard errors: 1/sqrt(80) = 11 % for 40 trials, 4 % for 320 rows
     assert np.exp(theta["log_sc"]) == pytest.approx(0.7, rel=0.35)
     assert np.exp(theta["log_sn"]) == pytest.approx(0.3, rel=0.15)
 
@@ -127,9 +127,9 @@ def test_a_refit_with_other_outputs_equals_a_new_fit():
     y = 5.0 + np.sin(X[:, 0]) + rng.normal(0, 0.4, 160)
     first = fit_gp(X, y, SE, LEVEL, trials=trials)
     z = y + rng.normal(0, 0.1, 160)
-    near = refit_gp(first, z)
-    anew = fit_gp(X, z, SE, LEVEL, trials=trials)
-    assert near.lml == pytest.approx(anew.lml, abs=1e-2)
+    refitted = refit_gp(first, z)
+    new_fit = fit_gp(X, z, SE, LEVEL, trials=trials)
+    assert refitted.lml == pytest.approx(new_fit.lml, abs=1e-2)
 
 
 def test_held_out_rows_are_predicted_by_the_others():
@@ -138,9 +138,9 @@ def test_held_out_rows_are_predicted_by_the_others():
     model = fit_gp(X, y, SE, LEVEL, trials=trials)
     keep = trials.trial != 2
     others = TrialRows(trials.trial[keep])
-    without = model.given(X[keep], y[keep], others)
-    # nothing of the trial left out is in it: its own rows change nothing
+    held_out = model.given(X[keep], y[keep], others)
+    # Changed outputs of the held-out trial must not change the prediction.
     changed = np.where(keep, y, 99.0)
     again = model.given(X[keep], changed[keep], others)
-    np.testing.assert_array_equal(without.predict(X)[0], again.predict(X)[0])
-    assert without.X.shape == (60, 2)
+    np.testing.assert_array_equal(held_out.predict(X)[0], again.predict(X)[0])
+    assert held_out.X.shape == (60, 2)

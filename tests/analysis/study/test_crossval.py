@@ -127,7 +127,7 @@ def test_chosen_rows_are_distinct_and_depend_on_seed_terrain_and_fold(trials):
         assert not np.array_equal(rows, choose_rows(other))
 
 
-def test_few_training_rows_are_all_taken(trials):
+def test_few_training_rows_are_all_chosen(trials):
     tasks, _ = plan_folds(trials, FitOptions(gp_points=100_000))
     assert choose_rows(tasks[0]).size == tasks[0].training.count
 
@@ -145,12 +145,12 @@ def test_scores_of_a_fold_are_those_of_its_model_on_the_unseen_trial(trials):
         fold = result.models[name]
         mean = fold.model.mean(own.F_n, own.v_t)
         assert fold.score.mae == np.mean(np.abs(own.F_t - mean))
-        # in the same blocks of rows: in others the last digit may differ
-        there = fold.model.mean(tested.F_n, tested.v_t)[start:]
-        assert fold.cross["TF"] == (np.mean(np.abs(foreign[-1].F_t - there)),)
+        # Same blocks as in run_fold: other block sizes may change the last digit.
+        predicted = fold.model.mean(tested.F_n, tested.v_t)[start:]
+        assert fold.cross["TF"] == (np.mean(np.abs(foreign[-1].F_t - predicted)),)
 
 
-def test_constant_for_scale_is_the_median_of_the_training_rows(trials):
+def test_the_constant_baseline_is_the_median_of_the_training_rows(trials):
     tasks, _ = plan_folds(trials, SMALL_FIT)
     task = tasks[4]
     median = np.median(task.training.F_t)
@@ -196,12 +196,12 @@ def test_the_search_reaches_the_best_of_many_starts(trials, kernel):
         starts = rng.uniform(*box.T, (20, len(box)))
         best = max(climb(likelihood, start, box).value for start in starts)
         missed += posterior_search(kernel, noise, X, r).lml < best - 1e-3
-    # 95 % of the fits of a study; of nine that is all
+    # Required: 95 % of the fits. With nine fits none may miss.
     assert missed == 0
 
 
-def counted(name, kept, seed):
-    """Return a prepared trial that has nothing but its kept samples."""
+def trial_of_samples(name, kept, seed):
+    """Return a stub of a prepared trial with random kept samples only."""
     F_n, v_t, F_t = np.random.default_rng(seed).normal(size=(3, kept))
     return SimpleNamespace(
         name=name, kept=kept, F_n=F_n, v_t=v_t, F_t=F_t, further=None
@@ -211,13 +211,13 @@ def counted(name, kept, seed):
 def many(trials):
     """Return `trials` trials on eight terrains."""
     return {
-        terrain: [counted(f"T{k}", 50, (k, j)) for k in range(trials // 8)]
+        terrain: [trial_of_samples(f"T{k}", 50, (k, j)) for k in range(trials // 8)]
         for j, terrain in enumerate("ABCDEFGH")
     }
 
 
 def tables_of(task):
-    """Return every table that a fold carries."""
+    """Return the sample tables of every trial used by a fold."""
     others = chain(*task.others.values())
     return [*task.training_trials, *task.test_trials, *others]
 
@@ -226,15 +226,7 @@ def tables_of(task):
 def test_folds_share_the_samples_of_the_trials(count):
     folds, _ = plan_folds(many(count), FitOptions())
     assert len(folds) == count
-    tables = [
-        table
-        for fold in folds
-        for table in (
-            *fold.training_trials,
-            *fold.test_trials,
-            *chain(*fold.others.values()),
-        )
-    ]
+    tables = [table for fold in folds for table in tables_of(fold)]
     assert len({id(table.F_t) for table in tables}) == count
 
 
@@ -249,14 +241,7 @@ def test_a_changed_sample_changes_the_fold(trials):
         task_key(run_fold, task) == key for task, key in zip(after, keys, strict=True)
     ]
     touched = [
-        any(
-            np.array_equal(rows.F_t, changed.F_t)
-            for rows in (
-                *task.training_trials,
-                *task.test_trials,
-                *chain(*task.others.values()),
-            )
-        )
+        any(np.array_equal(rows.F_t, changed.F_t) for rows in tables_of(task))
         for task in after
     ]
     assert is_same == [not is_touched for is_touched in touched]

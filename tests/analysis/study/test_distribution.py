@@ -24,40 +24,46 @@ def predicted(residuals=NORMAL, within=0.5, between=0.3, centre=2.0):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_quantiles_invert_the_distribution_function(kind):
-    law = predicted(KINDS[kind])
+    distribution = predicted(KINDS[kind])
     shares = np.array([1e-9, 1e-3, 0.02, *SHARES, 0.97, 0.9999])
-    for share, force in zip(shares, law.quantiles(shares)[:, 0], strict=True):
-        assert law.cdf(np.array([force]))[0] == pytest.approx(share, rel=1e-9)
+    for share, force in zip(shares, distribution.quantiles(shares)[:, 0], strict=True):
+        assert distribution.cdf(np.array([force]))[0] == pytest.approx(share, rel=1e-9)
 
 
 def test_extreme_quantiles_are_finite():
-    never, low, always = predicted().quantiles((0.0, 0.001, 1.0))[:, 0]
-    assert np.isfinite([never, always]).all()
-    assert never < low < always
+    lowest, low, highest = predicted().quantiles((0.0, 0.001, 1.0))[:, 0]
+    assert np.isfinite([lowest, highest]).all()
+    assert lowest < low < highest
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_density_is_the_slope_of_the_distribution_function(kind):
-    law = predicted(KINDS[kind])
+    distribution = predicted(KINDS[kind])
     for force in (0.5, 2.1, 4.0):
         h = 1e-5
-        step = law.cdf(np.array([force + h])) - law.cdf(np.array([force - h]))
-        density = np.exp(law.log_density(np.array([force])))
+        step = distribution.cdf(np.array([force + h])) - distribution.cdf(
+            np.array([force - h])
+        )
+        density = np.exp(distribution.log_density(np.array([force])))
         assert density[0] == pytest.approx(step[0] / (2 * h), rel=1e-5)
 
 
 @pytest.mark.parametrize("between", [0.0, 0.01, 0.3, 5.0])
-def test_normal_residuals_and_levels_are_normal_together(between):
+def test_the_sum_of_normal_residuals_and_levels_is_normal(between):
     from scipy.stats import norm
 
-    law = predicted(between=between)
+    distribution = predicted(between=between)
     exact = norm(2.0, np.sqrt(0.5 + between))
-    # residuals are summed over 64 nodes, ratios of variances interpolated
-    assert law.quantiles(SHARES)[:, 0] == pytest.approx(exact.ppf(SHARES), abs=0.02)
+    # quadrature with 64 nodes, interpolated over the ratio of variances
+    assert distribution.quantiles(SHARES)[:, 0] == pytest.approx(
+        exact.ppf(SHARES), abs=0.02
+    )
     force = np.array([1.2])
-    assert law.log_density(force)[0] == pytest.approx(exact.logpdf(1.2), abs=0.02)
-    assert law.mean[0] == pytest.approx(2.0, abs=1e-2)
-    assert law.sd[0] == pytest.approx(exact.std(), rel=2e-2)
+    assert distribution.log_density(force)[0] == pytest.approx(
+        exact.logpdf(1.2), abs=0.02
+    )
+    assert distribution.mean[0] == pytest.approx(2.0, abs=1e-2)
+    assert distribution.sd[0] == pytest.approx(exact.std(), rel=2e-2)
 
 
 def test_a_level_is_added_to_skewed_residuals():
@@ -65,10 +71,10 @@ def test_a_level_is_added_to_skewed_residuals():
     within, between, count = 0.5, 0.3, 400_000
     e = np.expm1(0.5 * rng.standard_normal(count))
     drawn = np.sqrt(within) * e + np.sqrt(between) * rng.standard_normal(count)
-    law = predicted(SKEWED, within, between, centre=0.0)
+    distribution = predicted(SKEWED, within, between, centre=0.0)
     expected = np.quantile(drawn, SHARES)
     # residuals are linear in the normal score between their nine quantiles
-    assert law.quantiles(SHARES)[:, 0] == pytest.approx(expected, abs=0.05)
+    assert distribution.quantiles(SHARES)[:, 0] == pytest.approx(expected, abs=0.05)
 
 
 def test_a_variance_from_few_trials_is_inflated():
@@ -80,47 +86,49 @@ def test_a_variance_from_few_trials_is_inflated():
 def test_residuals_are_weighted_by_trial():
     rng = np.random.default_rng(2)
     short, long = rng.normal(-5.0, 0.1, 100), rng.normal(5.0, 0.1, 10_000)
-    found = residual_quantiles([short, long])
-    assert found[SHARES.index(0.25)] == pytest.approx(-5.0, abs=0.1)
-    assert found[SHARES.index(0.75)] == pytest.approx(5.0, abs=0.1)
+    quantiles = residual_quantiles([short, long])
+    assert quantiles[SHARES.index(0.25)] == pytest.approx(-5.0, abs=0.1)
+    assert quantiles[SHARES.index(0.75)] == pytest.approx(5.0, abs=0.1)
     assert residual_quantiles([long]) == NORMAL
 
 
 def test_quantiles_of_equal_residuals_increase():
-    found = residual_quantiles([np.zeros(5), np.zeros(7)])
-    assert (np.diff(found) > 0.0).all()
-    assert found == pytest.approx(np.zeros(9), abs=1e-4)
+    quantiles = residual_quantiles([np.zeros(5), np.zeros(7)])
+    assert (np.diff(quantiles) > 0.0).all()
+    assert quantiles == pytest.approx(np.zeros(9), abs=1e-4)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("force", [0.3, 2.1, 5.0])
-def test_crps_equals_its_integral(kind, force):
+def test_crps_equals_its_defining_integral(kind, force):
     from scipy.integrate import quad
 
-    law = predicted(KINDS[kind])
+    distribution = predicted(KINDS[kind])
 
     def squared(y):
-        return (law.cdf(np.array([y]))[0] - (y >= force)) ** 2
+        return (distribution.cdf(np.array([y]))[0] - (y >= force)) ** 2
 
-    low, high = law.quantiles((1e-6, 1.0 - 1e-6))[:, 0]
+    low, high = distribution.quantiles((1e-6, 1.0 - 1e-6))[:, 0]
     parts = [min(low, force), force, max(high, force)]
     exact = sum(quad(squared, a, b, limit=200)[0] for a, b in pairwise(parts))
-    # the kink of the pinball loss costs a quadrature of 64 nodes up to a percent
-    assert law.crps(np.array([force]))[0] == pytest.approx(exact, rel=0.01, abs=2e-3)
+    # the kink of the pinball loss limits a 64-node quadrature to about 1 %
+    assert distribution.crps(np.array([force]))[0] == pytest.approx(
+        exact, rel=0.01, abs=2e-3
+    )
 
 
 @pytest.mark.parametrize("nu", [np.inf, 4.0])
 def test_a_normal_prediction_has_quantiles_and_a_distribution_function(nu):
-    law = Prediction(np.array([1.0, 2.0]), np.array([0.5, 2.0]), nu)
-    forces = law.quantiles(SHARES)
+    distribution = Prediction(np.array([1.0, 2.0]), np.array([0.5, 2.0]), nu)
+    forces = distribution.quantiles(SHARES)
     for share, row in zip(SHARES, forces, strict=True):
-        np.testing.assert_allclose(law.cdf(row), share, rtol=1e-9)
+        np.testing.assert_allclose(distribution.cdf(row), share, rtol=1e-9)
 
 
 def test_a_skewed_prediction_is_scored_by_median_and_mean():
-    law = predicted(SKEWED, within=1.0, between=0.0, centre=4.0)
+    distribution = predicted(SKEWED, within=1.0, between=0.0, centre=4.0)
     F_t = np.array([1.5])
-    found = score(F_t, law)
-    assert found.mae == pytest.approx(abs(1.5 - law.point[0]))
-    assert found.rmse == pytest.approx(abs(1.5 - law.mean[0]))
-    assert found.rmse != pytest.approx(found.mae, rel=1e-3)
+    scores = score(F_t, distribution)
+    assert scores.mae == pytest.approx(abs(1.5 - distribution.point[0]))
+    assert scores.rmse == pytest.approx(abs(1.5 - distribution.mean[0]))
+    assert scores.rmse != pytest.approx(scores.mae, rel=1e-3)

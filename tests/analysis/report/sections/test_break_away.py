@@ -1,4 +1,4 @@
-"""A report states forces from rest with their kind and their pushes."""
+"""Report section on the force available from rest: table, figures, data file."""
 
 import json
 
@@ -37,7 +37,7 @@ def test_every_terrain_has_its_force_from_rest_and_in_motion(results):
     assert "0.06 m/s" in table.note
 
 
-def test_the_table_states_the_kind_of_answer(results):
+def test_the_table_states_whether_the_model_is_break_away_or_sliding(results):
     table = break_away_table(results)
     assert cell(table, "S0", "from rest") == "break-away"
     assert cell(table, "TF", "from rest") == "sliding"
@@ -45,29 +45,29 @@ def test_the_table_states_the_kind_of_answer(results):
     assert cell(table, "TF", "distance (limit)") == "–"
 
 
-def test_counts_are_those_of_the_pushes(results):
-    for found in results.of(break_away_findings).values():
-        assert int((~found.is_held).sum()) == found.model.slips
-        assert int(found.is_held.sum()) == found.model.held
+def test_slip_and_hold_counts_match_the_pushes(results):
+    for terrain in results.of(break_away_findings).values():
+        assert int((~terrain.is_held).sum()) == terrain.model.slips
+        assert int(terrain.is_held.sum()) == terrain.model.held
 
 
 def test_survival_curve_and_model_agree_on_stones(results):
     for name in ("S0", "B0"):
-        found = results.of(break_away_findings)[name]
-        seen = found.survival.share_below(found.forces)
-        # about 17 slips: a standard error of .12
-        assert np.abs(seen - found.mean_risk).max() < 0.3
-        assert found.model.distance < found.limit
+        terrain = results.of(break_away_findings)[name]
+        observed_risk = terrain.survival.share_below(terrain.forces)
+        # about 17 slips: standard error 0.12
+        assert np.abs(observed_risk - terrain.mean_risk).max() < 0.3
+        assert terrain.model.distance < terrain.limit
 
 
 def test_numbers_of_the_report_are_in_its_data_file(results):
     numbers = json.loads(json.dumps(plain_findings(results)["break_away"]))
-    known = results.of(break_away_findings)["S0"]
-    answer = known.model.available(known.load, 0.1)
+    terrain = results.of(break_away_findings)["S0"]
+    available = terrain.model.available(terrain.load, 0.1)
     stored = next(a for a in numbers["S0"]["available"] if a["risk"] == 0.1)
-    assert stored["force"] == pytest.approx(answer.force)
+    assert stored["force"] == pytest.approx(available.force)
     assert numbers["S0"]["v_slip"] == 0.06
-    assert len(numbers["S0"]["pushes"]) == known.model.slips + known.model.held
+    assert len(numbers["S0"]["pushes"]) == terrain.model.slips + terrain.model.held
 
 
 def test_censored_peaks_are_marked_separately(results):
@@ -80,7 +80,7 @@ def test_censored_peaks_are_marked_separately(results):
     assert "0.06 m/s" in caption_available(results)
 
 
-def test_the_risk_is_shown_with_its_step_curve(results):
+def test_the_risk_figure_shows_the_kaplan_meier_curve(results):
     with styled():
         figure = draw_risk(results)
     first = figure.axes[0]
