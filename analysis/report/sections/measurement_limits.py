@@ -10,21 +10,22 @@ from analysis.report.results import StudyResults
 from analysis.report.section import ReportSection, ReportTable
 from analysis.report.sections.rig_health.health import RigTrial
 
-_SATURATED = 1e-9  # share of cycles
+_SATURATED = 1e-9  # share of saturated cycles above which it is reported
 _REACH_NOTE = (
-    "Measurable: by the sensor's ranges and the lever of the foot; – if "
-    "unknown: without a sample out of range it is at least the largest observed. "
+    "Measurable: largest traction within the sensor's ranges, given the lever arm of "
+    "the foot; – if the ranges are unknown (if no sample was out of range, it is at "
+    "least the largest observed). "
     "Uncertainty: standard uncertainty of a trial's mean F_t and F_n, "
-    "from the changes between the tares of its session; "
-    "with the zero interpolated between two tares (drift=interpolated) "
-    "it is four fifths of that. Floor: lower limit of any model's mean |error|, from "
-    "these changes and the noise of smoothed F_t at rest; "
-    "from the noise alone if a session has only one tare. "
+    "from the changes between the tares of its session; interpolating the zero "
+    "between two tares (drift=interpolated) reduces it by a fifth. "
+    "Floor: lower bound on the mean absolute error of any model, from tare changes "
+    "and the noise of smoothed F_t at rest, or from the noise alone if the session "
+    "has one tare. "
     "Drag: Coulomb friction of the joints as felt by the pushing hand, "
     "from the recorded friction calibration, less the compensation; "
     "without a calibration, from the arm model. F_t and F_n are measured at the wrist, "
-    "below the joints, and v_t at the joints: friction biases no model, but limits the "
-    "loads and speeds that are reached. Medians over trials."
+    "below the joints, and v_t at the joints: joint friction does not bias the models "
+    "but limits the loads and speeds that are reached. Medians over trials."
 )
 
 

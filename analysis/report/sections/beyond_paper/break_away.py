@@ -148,11 +148,13 @@ def _of_terrain(
         if trial.kept
         for push in find_pushes(trial, model.v_slip)
     )
-    at_rest = TerrainBreakAway(result.terrain, result.title, model, pushes, None)
+    without_motion = TerrainBreakAway(result.terrain, result.title, model, pushes, None)
     folds = result.models(GP_SE)
     if not folds:
-        return at_rest
-    prediction = folds[0].model.predict(np.array([at_rest.load]), np.array([slowest]))
+        return without_motion
+    prediction = folds[0].model.predict(
+        np.array([without_motion.load]), np.array([slowest])
+    )
     motion = (float(prediction.mean[0]), float(prediction.sd[0]))
     return TerrainBreakAway(result.terrain, result.title, model, pushes, motion)
 
@@ -172,18 +174,17 @@ def break_away_table(results: StudyResults) -> ReportTable:
             *(f"F_t at risk {risk:g} [N]" for risk in RISKS),
             *(f"in motion at {risk:g} [N]" for risk in RISKS),
             "distance (limit)",
-            "effect of the trial",
+            "trial effect",
         ),
         rows=[_break_away_row(terrain) for terrain in terrains.values()],
-        note="From rest: a push at a new location in a new trial slips with that "
-        f"probability (v_slip {', '.join(f'{v:g}' for v in speeds)} m/s) before F_t "
-        "reaches the force; brackets: 90 % bootstrap interval over trials. "
-        '"sliding": too few pushes slipped, the force is that of slow sliding. In '
-        "motion: the force at the slowest velocity of the window is below it with that "
-        "probability, by GP-SE. F_n: median of the pushes. Distance: of the model from "
-        "the Kaplan-Meier curve, and its critical value at 5 %. The effect of the "
-        "trial is the standard deviation of log force between trials, of force where "
-        "sliding.",
+        note="From rest: force at which a push at a new location in a new trial has "
+        f"slipped (v_t above {', '.join(f'{v:g}' for v in speeds)} m/s) with the "
+        "stated risk; brackets: 90 % bootstrap interval over trials. "
+        '"sliding": too few pushes slipped, so the force of slow sliding is used. In '
+        "motion: quantile of F_t at the slowest velocity of the window at the same "
+        "risk, by GP-SE. F_n: median of the pushes. Distance: between model and "
+        "Kaplan-Meier curve, with the critical value at 5 %. Trial effect: standard "
+        'deviation between trials of log force, or of the force for "sliding".',
         section=ReportSection.BEYOND,
     )
 
@@ -228,7 +229,7 @@ def draw_available(results: StudyResults) -> Figure | None:
                 label=f"risk {risk:g}",
             )
         _draw_interval(ax, terrain)
-        _name(ax, terrain)
+        _add_title(ax, terrain)
     axes[0].set_ylim(0.0, 1.15 * max(float(terrain.forces[-1]) for terrain in shown))
     axes[0].set_xlim(left=0.0)
     figure.supxlabel(LOAD_LABEL, fontsize=8)
@@ -254,7 +255,7 @@ def caption_available(results: StudyResults) -> str:
     return (
         f"Peaks of pushes from rest; a slip is faster than {limits} m/s. For a push "
         "that held, break-away lies above its peak. Curves: force at which a push at a "
-        "new location in a new trial slips with that probability; band: 90 % bootstrap "
+        "new location in a new trial slips with the stated risk; band: 90 % bootstrap "
         f"interval over trials at {_MIDDLE:g}. With risk {_MIDDLE:g}: "
         f"{'; '.join(parts)}."
     )
@@ -277,12 +278,12 @@ def draw_risk(results: StudyResults) -> Figure | None:
             lw=1.6,
             label="model, mean over the loads",
         )
-        _name(ax, terrain)
+        _add_title(ax, terrain)
     axes[0].set_ylim(0.0, 1.25)  # space for the text
     axes[0].set_yticks(np.linspace(0.0, 1.0, 6))
     axes[0].set_xlim(left=0.0)
     figure.supxlabel("required traction force [N]", fontsize=8)
-    figure.supylabel("probability of a slip before it", fontsize=8)
+    figure.supylabel("slip probability", fontsize=8)
     _legend(figure, axes)
     return figure
 
@@ -344,7 +345,7 @@ def _draw_survival(ax: Axes, terrain: TerrainBreakAway) -> None:
     ax.plot(held, curve.share_below(held), "|", ms=5, color=_HELD, label="held")
 
 
-def _name(ax: Axes, terrain: TerrainBreakAway) -> None:
+def _add_title(ax: Axes, terrain: TerrainBreakAway) -> None:
     ax.set_title(plain(terrain.title), loc="left")
     ax.text(
         0.03,
