@@ -83,7 +83,7 @@ def rows(rounds: int = _ROUNDS) -> list[BenchRow]:
             ratio,
             "times",
             _GOAL,
-            is_least=True,
+            is_lower_bound=True,
         )
         for where, ratio in gains.items()
     ]

@@ -249,7 +249,7 @@ def rows() -> list[BenchRow]:
                 sides[name].ratio,
                 "times",
                 goal,
-                is_least=True,
+                is_lower_bound=True,
             )
             if name in sides
             else not_installed(f"the same against {name}", goal)

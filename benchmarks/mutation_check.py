@@ -27,10 +27,11 @@ from acquisition.clock import SystemClock
 from benchmarks.mutation_targets import EQUIVALENT, TESTS
 
 ROOT = Path(__file__).parents[1]
-# A hanging mutation counts as killed: after 10 s and eight times the usual duration.
-LONGEST, TIMES = 10.0, 8.0
+# A mutation that hangs counts as killed. Time limit: eight times the usual duration,
+# at least 10 s.
+SHORTEST_LIMIT, LIMIT_FACTOR = 10.0, 8.0
 REQUIRED = 0.95  # share of mutations that the tests must kill
-_LARGE = 10
+_LARGE = 10  # numbers from here on are doubled, smaller ones incremented
 LIBRARIES = ("hypothesis", "mcap", "pinocchio", "pydantic", "pytest", "scipy.linalg")
 _COPIED = ("acquisition", "analysis", "experiments", "fakes", "ft_sensor", "wam")
 _FLIPPED = {
@@ -159,7 +160,7 @@ class MutatedTree:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._longest: dict[str, float] = {}
+        self._time_limits: dict[str, float] = {}
         for name in (*_COPIED, "tests"):
             shutil.copytree(ROOT / name, folder / name, ignore=_CACHES)
         for name in ("pyproject.toml", "SECURITY.md"):
@@ -167,12 +168,13 @@ class MutatedTree:
         self._processes = multiprocessing.get_context("forkserver")
         self._processes.set_forkserver_preload(list(LIBRARIES))
 
-    def is_sound(self, path: str) -> bool:
-        """Return whether the tests pass without a mutation; measure their duration."""
+    def passes_unmutated(self, path: str) -> bool:
+        """Run the tests without a mutation and time them; return whether they pass."""
         started_ns = SystemClock().now_ns()
-        code = self._exit_code(TESTS[path], 60.0 * TIMES, keeps_bytecode=True)
-        self._longest[path] = max(
-            LONGEST, TIMES * ((SystemClock().now_ns() - started_ns) * 1e-9)
+        code = self._exit_code(TESTS[path], 60.0 * LIMIT_FACTOR, keeps_bytecode=True)
+        self._time_limits[path] = max(
+            SHORTEST_LIMIT,
+            LIMIT_FACTOR * ((SystemClock().now_ns() - started_ns) * 1e-9),
         )
         return code == 0
 
@@ -181,21 +183,21 @@ class MutatedTree:
         target = self._folder / mutation.path
         original = target.read_text()
         target.write_text(mutation.source)
-        tests, longest = TESTS[mutation.path], self._longest[mutation.path]
+        tests, time_limit = TESTS[mutation.path], self._time_limits[mutation.path]
         try:
-            return self._exit_code(tests, longest, keeps_bytecode=False) != 0
+            return self._exit_code(tests, time_limit, keeps_bytecode=False) != 0
         finally:
             target.write_text(original)
 
     def _exit_code(
-        self, tests: tuple[str, ...], longest: float, *, keeps_bytecode: bool
+        self, tests: tuple[str, ...], time_limit: float, *, keeps_bytecode: bool
     ) -> int | None:
         """Return pytest's exit code; None = timed out."""
         process = self._processes.Process(
             target=run_tests, args=(self._folder, tests, keeps_bytecode)
         )
         process.start()
-        process.join(longest)
+        process.join(time_limit)
         if process.exitcode is None:
             os.killpg(process.pid or 0, signal.SIGKILL)
             process.join()
@@ -204,7 +206,7 @@ class MutatedTree:
 
 
 def run_tests(folder: Path, tests: tuple[str, ...], keeps_bytecode: bool) -> None:
-    """Run `tests` of the project in `folder` in this process, and end it."""
+    """Run `tests` of the project in `folder`; exit this process with pytest's code."""
     os.setsid()
     os.chdir(folder)
     sys.path.insert(0, str(folder))
@@ -216,25 +218,26 @@ def run_tests(folder: Path, tests: tuple[str, ...], keeps_bytecode: bool) -> Non
         os.dup2(null.fileno(), 2)
     pytest = importlib.import_module("pytest")
     hypothesis = importlib.import_module("hypothesis")
-    # Any failure will do: shrinking it to a minimal example takes a minute.
+    # Any failure is enough: shrinking it to a minimal example takes a minute.
     phases = [hypothesis.Phase.explicit, hypothesis.Phase.generate]
-    hypothesis.settings.register_profile("sown", phases=phases)
-    hypothesis.settings.load_profile("sown")
-    # pytest cannot rewrite modules that are already imported, and need not.
+    hypothesis.settings.register_profile("mutation", phases=phases)
+    hypothesis.settings.load_profile("mutation")
+    # pytest cannot rewrite modules that are already imported; it does not need to.
     rewriting = "ignore::pytest.PytestAssertRewriteWarning"
     options = ["-x", "-p", "no:cacheprovider", "-W", rewriting]
     os._exit(int(pytest.main([*options, *tests])))
 
 
-def sample(count: int, seed: int, number: int, only: str) -> list[Mutation]:
-    """Return round `number` of about `count` mutations, equally many per module."""
+def sample(count: int, seed: int, round_number: int, only: str) -> list[Mutation]:
+    """Return one round of about `count` mutations, equally many per module."""
     paths = [path for path in TESTS if only in path]
     size = -(-count // len(paths))
     chosen: list[Mutation] = []
     for path in paths:
         pool = mutations(path)
         order = np.random.default_rng(seed).permutation(len(pool))
-        chosen += [pool[i] for i in sorted(order[number * size : (number + 1) * size])]
+        part = order[round_number * size : (round_number + 1) * size]
+        chosen += [pool[i] for i in sorted(part)]
     return chosen
 
 
@@ -250,14 +253,14 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="mutations-") as scratch:
         tree = MutatedTree(Path(scratch))
         paths = dict.fromkeys(mutation.path for mutation in chosen)
-        unsound = [path for path in paths if not tree.is_sound(path)]
+        unsound = [path for path in paths if not tree.passes_unmutated(path)]
         if unsound:
             print("fail without a mutation:", *unsound)
             return 2
         for mutation in chosen:
-            is_dead = tree.is_killed(mutation)
-            killed += is_dead
-            word = "killed" if is_dead else "SURVIVED"
+            is_killed = tree.is_killed(mutation)
+            killed += is_killed
+            word = "killed" if is_killed else "SURVIVED"
             print(
                 f"{word:8} {mutation.path}:{mutation.line} {mutation.text}", flush=True
             )

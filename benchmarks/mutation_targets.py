@@ -134,7 +134,7 @@ TESTS = {
     "ft_sensor/weighing.py": ("tests/ft_sensor/test_tare.py",),
     "experiments/session/reducer.py": ("tests/experiments/session/test_reducer.py",),
     "experiments/session/kept_files.py": (
-        "tests/experiments/session/test_witnesses.py",
+        "tests/experiments/session/test_kept_file_comparison.py",
     ),
     "experiments/export/checksums.py": _PUBLISHED,
     "experiments/export/publication_check.py": _PUBLISHED,

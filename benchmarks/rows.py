@@ -1,4 +1,4 @@
-"""A row of the table of measurements; every benchmark returns such rows."""
+"""Row of the table of measurements, as returned by every benchmark."""
 
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -13,7 +13,7 @@ class BenchRow:
         value: measured value; None if it could not be measured.
         unit: unit of value and goal.
         goal: bound on the value; None = no goal.
-        is_least: the goal is a lower bound, not an upper one.
+        is_lower_bound: the goal is a lower bound, not an upper one.
         note: remark on the value, or why it is missing.
     """
 
@@ -21,7 +21,7 @@ class BenchRow:
     value: float | None
     unit: str
     goal: float | None = None
-    is_least: bool = False
+    is_lower_bound: bool = False
     note: str = ""
 
     @property
@@ -29,16 +29,18 @@ class BenchRow:
         """Verdict "met" or "not met"; empty without a goal or a value."""
         if self.goal is None or self.value is None:
             return ""
-        is_met = self.value >= self.goal if self.is_least else self.value <= self.goal
+        is_met = (
+            self.value >= self.goal if self.is_lower_bound else self.value <= self.goal
+        )
         return "met" if is_met else "not met"
 
     def cells(self) -> tuple[str, str, str, str]:
-        """Return description, today's value, goal and verdict as text."""
-        today = f"{self.value:.3g} {self.unit}" if self.value is not None else "-"
-        sign = "≥" if self.is_least else "≤"
+        """Return description, measured value, goal and verdict as text."""
+        measured = f"{self.value:.3g} {self.unit}" if self.value is not None else "-"
+        sign = "≥" if self.is_lower_bound else "≤"
         goal = "" if self.goal is None else f"{sign} {self.goal:g} {self.unit}"
         note = f" ({self.note})" if self.note else ""
-        return (self.what + note, today.strip(), goal.strip(), self.verdict)
+        return (self.what + note, measured.strip(), goal.strip(), self.verdict)
 
     def plain(self) -> dict[str, Any]:
         """Return the row as a dictionary for JSON."""

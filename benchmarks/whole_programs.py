@@ -1,9 +1,9 @@
-"""Time of whole programs: the demo, its report a second time, a study of 80 trials.
+"""Duration of whole programs: the demo, a repeated report, a study of 80 trials.
 
     python -m benchmarks.whole_programs
 
-Each command runs in its own process, as from a shell, the two sessions at the same
-time. The second report takes its fits from the result store.
+Each command runs in its own process, as from a shell; the two sessions run
+concurrently. The second report takes its fits from the result store.
 """
 
 import ctypes
@@ -20,17 +20,17 @@ from benchmarks.rows import BenchRow
 TRIALS = Path(__file__).parents[2] / "shared" / "data" / "rehearsal_trials.npz"
 _TERRAINS = ("S0", "TF")
 _SUBREAPER = 36  # PR_SET_CHILD_SUBREAPER of prctl(2)
-# Goals; that of the study assumes SciPy's optimiser.
-_DEMO_S, _AGAIN_S, _STUDY_S = 30.0, 4.0, 100.0
+# Goals [s]; the one of the study assumes SciPy's optimiser.
+_DEMO_GOAL_S, _REPEAT_GOAL_S, _STUDY_GOAL_S = 30.0, 4.0, 100.0
 
 
-def started(*arguments: str) -> subprocess.Popen[bytes]:
+def start(*arguments: str) -> subprocess.Popen[bytes]:
     """Start the program with these arguments, its output discarded."""
     command = [sys.executable, "-m", "traction", *arguments]
     return subprocess.Popen(command, stdout=subprocess.DEVNULL)
 
 
-def ended(*programs: subprocess.Popen[bytes]) -> None:
+def wait_for(*programs: subprocess.Popen[bytes]) -> None:
     """Wait for programs to end.
 
     Raises:
@@ -42,9 +42,9 @@ def ended(*programs: subprocess.Popen[bytes]) -> None:
 
 
 def cpu_time() -> float:
-    """Return the processor time of all programs that have ended so far [s].
+    """Return the processor time of all finished programs [s].
 
-    Processes that a program left running are waited for and included.
+    Processes that a program left running are awaited and included.
     """
     while True:
         try:
@@ -56,42 +56,42 @@ def cpu_time() -> float:
 
 
 def demo_rows(folder: Path) -> list[BenchRow]:
-    """Return the time of `make demo` once installed, and of its report again."""
-    where = ("--data", str(folder))
+    """Return the durations of the demo without installation and of a second report."""
+    data = ("--data", str(folder))
     begin = time.perf_counter()
-    ended(*(started("run", row, "--fake", "--fast", *where) for row in _TERRAINS))
+    wait_for(*(start("run", row, "--fake", "--fast", *data) for row in _TERRAINS))
     recorded = time.perf_counter()
-    ended(started("report", "--all", *where))
+    wait_for(start("report", "--all", *data))
     whole, recording = time.perf_counter() - begin, recorded - begin
     before = cpu_time()
-    ended(started("report", "--all", *where))
+    wait_for(start("report", "--all", *data))
     return [
         BenchRow(
-            "two sessions of ten trials side by side and their report, wall time",
+            "two concurrent sessions of ten trials and their report, wall time",
             whole,
             "s",
-            _DEMO_S,
+            _DEMO_GOAL_S,
             note=f"sessions {recording:.0f} s, report {whole - recording:.0f} s",
         ),
         BenchRow(
-            "the report of 20 trials again, results kept",
+            "repeated report of 20 trials, results stored",
             cpu_time() - before,
             "s",
-            _AGAIN_S,
+            _REPEAT_GOAL_S,
         ),
     ]
 
 
 def study_row(folder: Path) -> BenchRow:
-    """Return the time of fits and figures of 80 trials on 8 terrains."""
+    """Return the duration of the fits and figures of 80 trials on 8 terrains."""
     what = "80 trials on 8 terrains: all fits, figures and page, wall time"
     if not TRIALS.exists():
-        return BenchRow(what, None, "s", _STUDY_S, note="its trials are not there")
+        return BenchRow(what, None, "s", _STUDY_GOAL_S, note="trials not found")
     begin, before = time.perf_counter(), cpu_time()
-    ended(started("fit", str(TRIALS), "--to", str(folder)))
+    wait_for(start("fit", str(TRIALS), "--to", str(folder)))
     wall = time.perf_counter() - begin
     used = f"{cpu_time() - before:.0f} s of processor time"
-    return BenchRow(what, wall, "s", _STUDY_S, note=used)
+    return BenchRow(what, wall, "s", _STUDY_GOAL_S, note=used)
 
 
 def rows() -> list[BenchRow]:

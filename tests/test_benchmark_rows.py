@@ -14,8 +14,8 @@ from benchmarks.scale import exponent, folds_of, rows_of
     [
         (BenchRow("x", 1.0, "s", 2.0), "met"),
         (BenchRow("x", 3.0, "s", 2.0), "not met"),
-        (BenchRow("x", 3.0, "times", 2.0, is_least=True), "met"),
-        (BenchRow("x", 1.0, "times", 2.0, is_least=True), "not met"),
+        (BenchRow("x", 3.0, "times", 2.0, is_lower_bound=True), "met"),
+        (BenchRow("x", 1.0, "times", 2.0, is_lower_bound=True), "not met"),
         (BenchRow("x", 1.0, "s"), ""),
         (BenchRow("x", None, "s", 2.0, note="not installed"), ""),
     ],

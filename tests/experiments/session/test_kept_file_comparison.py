@@ -1,6 +1,6 @@
 """Every kind of damage to the files of a session is reported.
 
-A small session of two kept trials and a rejected one, damaged in one way at a time.
+Each test damages a small session of two kept trials and a rejected one.
 """
 
 import json
@@ -67,10 +67,10 @@ def cut_lines(count):
     return lambda session: write_lines(session, lines(session)[:count])
 
 
-def lose_line(number):
+def remove_line(number):
     def damage(session):
-        every = lines(session)
-        write_lines(session, every[: number - 1] + every[number:])
+        all_lines = lines(session)
+        write_lines(session, all_lines[: number - 1] + all_lines[number:])
 
     return damage
 
@@ -89,7 +89,7 @@ def flip(name):
     return damage
 
 
-def shorten(session):
+def truncate_recording(session):
     path = session.path / "trials/T01.mcap"
     path.write_bytes(path.read_bytes()[:-100])
 
@@ -105,13 +105,13 @@ def add_trial(session):
     flip("trials/T03.mcap")(session)
 
 
-def link_out(session):
+def replace_by_link(session):
     path = session.path / "trials/T01.mcap"
     path.rename(session.path.parent / "elsewhere.mcap")
     path.symlink_to(session.path.parent / "elsewhere.mcap")
 
 
-def name_another_terrain(session):
+def change_terrain(session):
     """Make the first line of the journal name another terrain."""
     first, *rest = lines(session)
     event = {k: v for k, v in parse_line(first).items() if k not in {"line", "crc"}}
@@ -129,7 +129,7 @@ DAMAGES = {
     ),
     "journal cut": (cut_lines(9), {("events.jsonl", "ends after 9 of 12 lines")}),
     "line of T02 lost": (
-        lose_line(11),
+        remove_line(11),
         {
             ("events.jsonl", "lacks lines or has others: line 11 was line 12"),
             ("events.jsonl", "ends after 11 of 12 lines"),
@@ -141,7 +141,7 @@ DAMAGES = {
         {("events.jsonl", "has a wrong checksum in line 5")},
     ),
     "rejection lost": (
-        lose_line(5),
+        remove_line(5),
         {("events.jsonl", "lacks lines or has others: line 5 was line 6")},
     ),
     "summary gone": (
@@ -170,7 +170,7 @@ DAMAGES = {
         {("trials/T02.mcap", CHECKSUM)},
     ),
     "recording cut": (
-        shorten,
+        truncate_recording,
         {("trials/T01.mcap", f"is changed: {SIZE - 100} bytes, {SIZE} were kept")},
     ),
     "trial unknown to the journal": (
@@ -181,7 +181,7 @@ DAMAGES = {
         },
     ),
     "another terrain in the journal": (
-        name_another_terrain,
+        change_terrain,
         {("events.jsonl", "is of S0: a renamed session")},
     ),
 }
@@ -192,7 +192,7 @@ def test_a_sound_session_has_no_deviation(session):
 
 
 @pytest.mark.parametrize("name", DAMAGES)
-def test_every_damage_is_named(session, name):
+def test_every_damage_is_reported(session, name):
     damage, wanted = DAMAGES[name]
     damage(session)
     reported = deviations(session)
@@ -202,12 +202,12 @@ def test_every_damage_is_named(session, name):
     assert others <= {missing, "is kept in session.json, not in the journal"}
 
 
-def test_a_recording_that_is_a_link_is_named(session):
-    link_out(session)
+def test_a_recording_that_is_a_link_is_reported(session):
+    replace_by_link(session)
     assert {d.file for d in compare_kept(session)} == {"trials/T01.mcap"}
 
 
-def test_a_missing_session_json_is_named_from_the_second_event_on(session):
+def test_a_missing_session_json_is_reported_from_the_second_event_on(session):
     write_lines(session, lines(session)[:2])
     drop("session.json")(session)
     assert ("session.json", "is missing or damaged") in deviations(session)
@@ -216,7 +216,7 @@ def test_a_missing_session_json_is_named_from_the_second_event_on(session):
 
 
 @pytest.mark.parametrize("fields", [{"kept": ["T01"]}, {"events": 12}])
-def test_an_empty_journal_is_named_if_session_json_has_events_or_trials(
+def test_an_empty_journal_is_reported_if_session_json_has_events_or_trials(
     session, fields
 ):
     write_lines(session, [])
@@ -225,7 +225,7 @@ def test_an_empty_journal_is_named_if_session_json_has_events_or_trials(
     assert missing in deviations(session)
 
 
-def test_a_sidecar_with_an_invalid_name_is_named(session):
+def test_a_sidecar_with_an_invalid_name_is_reported(session):
     sidecar = json.loads((session.path / "trials/T01.json").read_text())
     (session.path / "trials/Tab.json").write_text(json.dumps(sidecar))
     assert deviations(session) == {
@@ -233,7 +233,7 @@ def test_a_sidecar_with_an_invalid_name_is_named(session):
     }
 
 
-def test_a_summary_behind_the_journal_is_no_deviation(session):
+def test_a_session_json_older_than_the_journal_is_no_deviation(session):
     change_json(session.path / "session.json", kept=["T01"], events=8)
     assert deviations(session) == set()
 
@@ -245,7 +245,7 @@ def test_a_torn_last_line_is_no_deviation(session):
 
 
 @pytest.mark.parametrize("name", ["2027-01-15_S001_TF", "2027-01-15_S001_S0.fake"])
-def test_a_name_that_contradicts_the_journal_is_named(data, session, name):
+def test_a_folder_name_that_contradicts_the_journal_is_reported(data, session, name):
     first = parse_line(lines(session)[0])
     plain = {k: v for k, v in first.items() if k not in {"line", "crc"}}
     line = journal_line({**plain, "fake": {"seed": 1}}, 1)
@@ -257,8 +257,8 @@ def test_a_name_that_contradicts_the_journal_is_named(data, session, name):
 
 
 @pytest.mark.parametrize(("mark", "kind"), [("", "simulated"), (".fake", "recorded")])
-def test_a_session_json_of_the_other_kind_is_named(session, mark, kind):
-    """Where the journal does not state the kind of session, session.json does."""
+def test_a_session_json_of_the_other_kind_is_reported(session, mark, kind):
+    """session.json states the kind of session if the journal does not."""
     folder = session.path.rename(session.path.with_name(f"2027-01-15_S001_TF{mark}"))
     change_json(folder / "session.json", simulated=kind == "simulated")
     renamed = find_session(folder.parents[1], "S001")
@@ -325,14 +325,14 @@ def test_trials_of_a_copied_session_are_recognised_by_checksum(data, session):
 
 
 def test_kept_trials_are_hashed_by_the_given_function(session):
-    asked = []
+    hashed = []
 
     def digest(path):
-        asked.append(path.name)
+        hashed.append(path.name)
         return sha256_of(path)
 
     assert compare_kept(session, digest) == []
-    assert asked == ["T01.mcap", "T02.mcap"]
+    assert hashed == ["T01.mcap", "T02.mcap"]
 
 
 def test_a_folder_that_cannot_be_read_is_a_deviation(session):
