@@ -24,36 +24,36 @@ if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
 COMMANDS = {
-    "check": "check that the rig is ready: one graded page",
+    "check": "check that the rig is ready and print the result on one page",
     "run": "record a session of trials on one terrain",
     "resume": "continue an unfinished session",
     "redo": "record one trial of a session again",
-    "status": "kept trials per terrain, counted from verified files",
+    "status": "count the kept trials per terrain from verified files",
     "note": "write a remark on a session or a trial",
     "verdict": "change the verdict on a recorded trial",
-    "commission": "the first day of an arm: guided steps, each one proof",
+    "commission": "commission an arm in guided steps that each verify one property",
     "zero": "set the home position after confirmation",
-    "bench": "measures the control loop on this machine",
-    "calibrate": "guided calibrations of the rig",
-    "teach": "teach by hand where a container stands",
+    "bench": "measure the control loop on this machine",
+    "calibrate": "calibrate a part of the rig in guided steps",
+    "teach": "teach the location of a container by leading the arm",
     "fake": "serve the simulated arm to other programs over CAN",
     "replay": "replay a trial, or decode a bus log",
     "watch": "serve the running session to a second screen, read only",
     "export": "write trials as CSV or Parquet tables with units and checksums",
-    "import": "make trials from the log of another robot and its URDF",
+    "import": "create trials from the log of another robot and its URDF",
     "publish": "write recordings, tables and results as an RO-Crate for an archive",
-    "init": "write rig.toml and matrix.toml to be edited",
-    "setup": "print or install what the computer at the arm needs",
-    "bundle": "collect what happened in a session in one file, for help",
+    "init": "write rig.toml and matrix.toml for editing",
+    "setup": "print or install the system files of the host computer",
+    "bundle": "pack the files of a session for a support request",
     "verify": "verify kept trials, or a publication, by their checksums",
     "recover": "recover the readable part of unfinished trial files",
-    "rehearse": "simulate the whole study and check it against its bands",
+    "rehearse": "simulate the whole study and check it against acceptance bands",
     "report": "fit and compare models of recorded sessions, write the report",
     "identify": "classify the terrain of a trial: probabilities over time",
     "fit": "fit and compare models of external data, npz or CSV",
 }
 _MODULES = {"import": "import_log"}  # commands named like Python keywords
-_OF_THE_DISK = {
+_DISK_ERRORS = {
     errno.EIO,
     errno.ENOSPC,
     errno.EDQUOT,
@@ -66,13 +66,13 @@ FIRST_STEPS = """\
 Traction measures how a robotic foot grips loose stones. To try it without hardware:
 
   traction run S0 --fake --trials 1           one simulated trial, you press the keys
-  traction run S0 --fake --fast --trials 3    three more, as fast as the machine can
+  traction run S0 --fake --fast --trials 3    three more, as fast as possible
   traction status                             kept trials, next terrain
   traction report --all                       models, comparison and figures on one page
 
 With an arm:
 
-  traction init lab                           rig.toml and matrix.toml, to be edited
+  traction init lab                           write rig.toml and matrix.toml
   traction check --config lab/rig.toml        is the rig ready? nothing moves
 
 traction --help lists all commands, traction COMMAND --help shows examples of one.
@@ -85,8 +85,8 @@ exit codes: 0 done, 1 a bug, 2 usage or configuration, 3 preflight failed,
 130 interrupted outside a session"""
 
 _NO_FOLDER = (
-    "The folder this was started in is gone, or may not be read. Go to another one: "
-    "cd ~   Nothing was started."
+    "The working directory is missing or unreadable. Change to another one: cd ~   "
+    "Nothing was started."
 )
 
 
@@ -104,7 +104,7 @@ class _Parser(argparse.ArgumentParser):
         super().error(message)
 
     def print_help(self, file: "SupportsWrite[str] | None" = None) -> None:
-        """Print the help; unlike argparse it reports a full disk."""
+        """Print the help; output errors are not swallowed as in argparse."""
         print(self.format_help(), end="", file=file)
         sys.stdout.flush()
 
@@ -117,7 +117,7 @@ def build_parser(wanted: Collection[str] = COMMANDS) -> argparse.ArgumentParser:
     """Return the parser of all commands; imports no slow library.
 
     Args:
-        wanted: commands with options; the others have only their names.
+        wanted: commands whose options are loaded; the others get only a help text.
     """
     parser = _Parser(
         prog="traction",
@@ -160,15 +160,15 @@ def _show_first_steps(_: argparse.Namespace) -> int:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns its exit code."""
-    with _ended_as_by_ctrl_c():
+    with _signals_as_keyboard_interrupt():
         return _main(arguments)
 
 
 @contextmanager
-def _ended_as_by_ctrl_c() -> Generator[None]:
-    """End a command at SIGTERM or a closed terminal as at Ctrl-C.
+def _signals_as_keyboard_interrupt() -> Generator[None]:
+    """Turn SIGTERM and SIGHUP into KeyboardInterrupt: a command closes its resources.
 
-    Its resources are closed. A session handles all three itself.
+    A session installs its own handlers.
     """
     replaced: list[signal.Signals] = []
     for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
@@ -191,10 +191,10 @@ def _main(arguments: Sequence[str] | None) -> int:
     if not _has_folder():
         print(_NO_FOLDER, file=sys.stderr)  # noqa: T201
         return SettingsError.exit_code
-    named = list(sys.argv[1:] if arguments is None else arguments)
-    parser = build_parser(set(named) & set(COMMANDS))
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    parser = build_parser(set(words) & set(COMMANDS))
     try:
-        args = parser.parse_args(named)
+        args = parser.parse_args(words)
     except OSError as error:  # --version and --help print during parsing
         return _report_output(error)
     try:
@@ -209,7 +209,7 @@ def _main(arguments: Sequence[str] | None) -> int:
     except BrokenPipeError as error:
         return _report_output(error)
     except Exception as error:
-        if isinstance(error, OSError) and error.errno in _OF_THE_DISK:
+        if isinstance(error, OSError) and error.errno in _DISK_ERRORS:
             return _report_disk(error)
         return _report_bug()
     try:
@@ -220,7 +220,7 @@ def _main(arguments: Sequence[str] | None) -> int:
 
 
 def _has_folder() -> bool:
-    """Return whether the working directory still exists."""
+    """Return whether the working directory exists and is readable."""
     try:
         Path.cwd()
     except OSError:
@@ -285,7 +285,7 @@ def _print_message(name: str, details: Mapping[str, object]) -> int:
 
 
 class _Version(argparse.Action):
-    """Prints version and commit; git is asked only here."""
+    """Prints version and commit; runs git only on request."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         from experiments import provenance

@@ -10,7 +10,7 @@ from typing import Literal
 DEFAULT_DATA = Path("data")
 FRICTION = 0.4  # share of another arm's friction in simulated joints; ASSUMED
 CABLES = (8.0, 25.0)  # Hz, resonance of joints on cables; ASSUMED
-PACES = ("steady", "slow", "fast", "clumsy")  # of the simulated person
+PACES = ("steady", "slow", "fast", "clumsy")  # how the simulated person pushes
 # Time in a simulation: paced to real time, at full speed, or in processes.
 TimeMode = Literal["paced", "fast", "processes"]
 
@@ -24,15 +24,15 @@ def add_global_options(
         parser: parser of the program, or of one command.
         is_after_command: parser of a command: omitted options keep their value.
     """
-    left_out = SUPPRESS if is_after_command else None
+    default = SUPPRESS if is_after_command else None
     group = parser.add_argument_group("global options")
     group.add_argument(
-        "--config", type=Path, default=left_out, metavar="FILE", help="rig.toml to use"
+        "--config", type=Path, default=default, metavar="FILE", help="rig.toml to use"
     )
     group.add_argument(
         "--data",
         type=Path,
-        default=left_out or DEFAULT_DATA,
+        default=default or DEFAULT_DATA,
         metavar="DIR",
         help="data folder",
     )
@@ -40,11 +40,11 @@ def add_global_options(
         "-v",
         "--verbose",
         action="store_true",
-        default=left_out or False,
+        default=default or False,
         help="show the cause of an error",
     )
     group.add_argument(
-        "--no-color", action="store_true", default=left_out or False, help="plain text"
+        "--no-color", action="store_true", default=default or False, help="plain text"
     )
 
 
@@ -77,7 +77,7 @@ def number_within(least: float, most: float, wanted: str) -> Callable[[str], flo
     return read
 
 
-def add_simulated_arm(parser: ArgumentParser) -> None:
+def add_simulation_options(parser: ArgumentParser) -> None:
     """Declare the options of the simulated arm."""
     parser.add_argument(
         "--seed", type=int, default=1, metavar="N", help="seed of the simulation (1)"
@@ -93,7 +93,7 @@ def add_simulated_arm(parser: ArgumentParser) -> None:
         "--cables",
         type=number_within(*CABLES, "a resonance of 8 to 25 Hz, e.g. 15"),
         metavar="HZ",
-        help="resonance of the simulated joints on their cables (stiff)",
+        help="resonance of the simulated joints on elastic cables (rigid)",
     )
 
 
@@ -116,7 +116,7 @@ def friction_share(args: Namespace) -> float:
     return args.friction
 
 
-def add_seed(parser: ArgumentParser) -> None:
+def add_seed_option(parser: ArgumentParser) -> None:
     """Declare the seed of the training points of Gaussian processes."""
     parser.add_argument(
         "--points-seed",
@@ -128,7 +128,7 @@ def add_seed(parser: ArgumentParser) -> None:
     )
 
 
-def add_analysis(parser: ArgumentParser) -> None:
+def add_analysis_options(parser: ArgumentParser) -> None:
     """Declare the choices of an analysis."""
     group = parser.add_argument_group("choices of the analysis")
     group.add_argument(
@@ -141,12 +141,12 @@ def add_analysis(parser: ArgumentParser) -> None:
         "--every",
         type=int,
         metavar="N",
-        help="one sample of N is kept, samples at 500 Hz (5: 10 ms)",
+        help="keep every N-th sample at 500 Hz (5: 10 ms)",
     )
     group.add_argument(
         "--window",
         metavar="LOW:HIGH",
-        help="velocities that are kept [m/s] (0.005:0.2)",
+        help="range of velocities to keep [m/s] (0.005:0.2)",
     )
     group.add_argument(
         "--bounds",
@@ -163,30 +163,31 @@ def add_analysis(parser: ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="repeat the study under another choice and show both: smoothing=N, "
+        help="repeat the study with another choice and show both: smoothing=N, "
         "window=LOW:HIGH, lag=MS, frame=sole, drift=interpolated, "
         "kernel=as_printed, static_friction=proportional; more than once for several",
     )
 
 
-def add_covariate(parser: ArgumentParser, columns: str) -> None:
+def add_covariate_option(parser: ArgumentParser, columns: str) -> None:
     """Declare the columns to test; `columns` lists the available ones."""
     parser.add_argument(
         "--covariate",
         metavar="NAME,..",
-        help=f"say whether columns tell more of F_t than F_n and v_t do: {columns}",
+        help="test whether columns improve the prediction of F_t from F_n and v_t: "
+        f"{columns}",
     )
 
 
-def add_table_form(parser: ArgumentParser) -> None:
+def add_table_options(parser: ArgumentParser) -> None:
     """Declare the options for tables of other programs."""
     group = parser.add_argument_group("tables")
     group.add_argument(
         "--columns",
         metavar="t=..,v_t=..,F_n=..,F_t=..",
-        help="names in a CSV or Parquet file, or places from 1; an item with a comma "
-        "in quotes; trial=.. and terrain=..: columns of a CSV whose words say which "
-        "rows belong together",
+        help="column names in a CSV or Parquet file, or numbers from 1; quote an item "
+        "that contains a comma; trial=.. and terrain=..: CSV columns that group the "
+        "rows",
     )
     group.add_argument(
         "--unit", metavar="v_t=mm/s,..", help="units where a header gives none"
@@ -194,14 +195,14 @@ def add_table_form(parser: ArgumentParser) -> None:
     group.add_argument(
         "--negate",
         metavar="F_n,..",
-        help="columns with the other sign, e.g. F_n below zero in compression",
+        help="columns with the opposite sign, e.g. F_n negative in compression",
     )
     group.add_argument(
         "--sep",
         default=",",
         metavar="CHAR",
-        help="what separates the columns of a CSV: , by default, ; or another "
-        "character, tab, or blanks for runs of blanks",
+        help="column separator of a CSV: a character (default ,), tab, or blanks for "
+        "runs of spaces",
     )
     group.add_argument(
         "--decimal",
@@ -213,76 +214,78 @@ def add_table_form(parser: ArgumentParser) -> None:
     group.add_argument(
         "--skip",
         metavar="LINES",
-        help="lines of a CSV that are no part of the table, e.g. 1-3,5",
+        help="lines of a CSV to skip, e.g. 1-3,5",
     )
     group.add_argument(
         "--rate",
         type=number_within(1, 100_000, "a rate in Hz, e.g. 500"),
         metavar="HZ",
-        help="rows of a CSV per second, where it has no time",
+        help="sampling rate of a CSV without a time column",
     )
     group.add_argument("--terrain", metavar="NAME", help="terrain of the CSV files")
 
 
-def add_scheduler(parser: ArgumentParser) -> None:
+def add_scheduler_option(parser: ArgumentParser) -> None:
     """Declare the scheduler of the fits."""
     parser.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="fit on the Dask cluster there: tls://HOST:PORT, or tcp://127.0.0.1:8786; "
+        help="fit on this Dask cluster: tls://HOST:PORT or tcp://127.0.0.1:8786; "
         "needs traction[cluster]",
     )
 
 
-def add_pdf(parser: ArgumentParser) -> None:
+def add_pdf_option(parser: ArgumentParser) -> None:
     """Declare the option for figures as PDF."""
     parser.add_argument(
-        "--pdf", action="store_true", help="figures as PDF, too; takes seconds more"
+        "--pdf",
+        action="store_true",
+        help="also write the figures as PDF; takes a few seconds more",
     )
 
 
-def add_time(parser: ArgumentParser) -> None:
+def add_time_options(parser: ArgumentParser) -> None:
     """Declare the mode of time in a simulation."""
     chosen = parser.add_mutually_exclusive_group()
     chosen.add_argument(
         "--fast",
         action="store_true",
-        help="simulated time passes as fast as the computer can, only if simulated",
+        help="run simulated time as fast as possible (simulation only)",
     )
     chosen.add_argument(
         "--processes",
         action="store_true",
-        help="the processes of the real rig on the wall clock, only if simulated; "
+        help="use the processes of the real rig, on the wall clock (simulation only); "
         "needs an idle computer",
     )
 
 
-def asked_time(args: Namespace) -> TimeMode | None:
-    """Return the requested mode of simulated time; None = not given."""
+def requested_time_mode(args: Namespace) -> TimeMode | None:
+    """Return the requested mode of simulated time; None if not given."""
     if args.fast:
         return "fast"
     return "processes" if args.processes else None
 
 
-def add_recording(parser: ArgumentParser) -> None:
+def add_recording_options(parser: ArgumentParser) -> None:
     """Declare the options of commands that open a new session."""
     parser.add_argument("terrain", metavar="TERRAIN", help="a name in matrix.toml")
     parser.add_argument("--fake", action="store_true", help="simulated devices")
-    add_time(parser)
+    add_time_options(parser)
     parser.add_argument(
-        "--trials", type=int, metavar="N", help="trials to keep (of the terrain)"
+        "--trials", type=int, metavar="N", help="trials to keep (as in matrix.toml)"
     )
     parser.add_argument(
         "--operator", default="", metavar="NAME", help="name of the operator"
     )
-    add_simulated_arm(parser)
+    add_simulation_options(parser)
     parser.add_argument(
         "--pace",
         choices=PACES,
         default=PACES[0],
         help="how the simulated person pushes (steady)",
     )
-    add_fault(parser)
+    add_fault_option(parser)
     parser.add_argument(
         "--operator-script",
         metavar="FILE|auto",
@@ -293,16 +296,16 @@ def add_recording(parser: ArgumentParser) -> None:
         "--new", action="store_true", help="close an unfinished session first"
     )
     parser.add_argument(
-        "--can-log", type=Path, metavar="FILE", help="write every CAN frame there"
+        "--can-log", type=Path, metavar="FILE", help="write every CAN frame to FILE"
     )
 
 
-def add_reopening(parser: ArgumentParser) -> None:
+def add_reopening_options(parser: ArgumentParser) -> None:
     """Declare the options of commands that open a session again."""
     parser.add_argument(
         "--fake", action="store_true", help="accept a simulated session only"
     )
-    add_time(parser)
+    add_time_options(parser)
     parser.add_argument(
         "--operator",
         default="",
@@ -310,52 +313,52 @@ def add_reopening(parser: ArgumentParser) -> None:
         help="name of the operator (as before)",
     )
     parser.add_argument(
-        "--force", action="store_true", help="record although conditions have changed"
+        "--force", action="store_true", help="record even if conditions have changed"
     )
     parser.add_argument(
         "--operator-script",
         metavar="FILE|auto",
-        help="answers to the reviews, only if simulated",
+        help="answers to the reviews (simulation only)",
     )
-    add_allow_missing(parser)
-    add_fault(parser)
+    add_allow_missing_option(parser)
+    add_fault_option(parser)
     parser.add_argument(
-        "--can-log", type=Path, metavar="FILE", help="write every CAN frame there"
+        "--can-log", type=Path, metavar="FILE", help="write every CAN frame to FILE"
     )
 
 
-def add_allow_missing(parser: ArgumentParser) -> None:
-    """Declare the option to go on without missing or changed kept trials."""
+def add_allow_missing_option(parser: ArgumentParser) -> None:
+    """Declare the option to continue without missing or changed kept trials."""
     parser.add_argument(
         "--allow-missing",
         action="store_true",
-        help="go on without kept trials that are missing or changed",
+        help="continue without kept trials that are missing or changed",
     )
 
 
-def add_fault(parser: ArgumentParser) -> None:
+def add_fault_option(parser: ArgumentParser) -> None:
     """Declare the faults to inject into a rehearsal."""
     parser.add_argument(
         "--fault",
         action="append",
         default=[],
         metavar="NAME[@Tn+SECONDSs]",
-        help="raise a fault, only if simulated; can be repeated",
+        help="raise a fault (simulation only); can be repeated",
     )
 
 
-def add_port(parser: ArgumentParser, when: str = "") -> None:
+def add_port_option(parser: ArgumentParser, when: str = "") -> None:
     """Declare the port of viewers; `when` names the option that needs it."""
     parser.add_argument(
         "--port",
         type=number_within(0, 65_535, "a whole number 0..65535, e.g. 8765"),
         default=8765,
         metavar="N",
-        help=f"{when}where to serve on 127.0.0.1 (8765), 0 = any that is free",
+        help=f"{when}port on 127.0.0.1 (8765); 0 = any free port",
     )
 
 
-def add_author(parser: ArgumentParser) -> None:
+def add_author_option(parser: ArgumentParser) -> None:
     """Declare the author of a note or a verdict."""
     parser.add_argument(
         "--operator",
@@ -371,7 +374,7 @@ def data_option(data: Path) -> str:
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
-    """Return the known name nearest to `name`, None if none is near."""
+    """Return the most similar known name; None if none is similar."""
     from difflib import get_close_matches
 
     names = {candidate.lower(): candidate for candidate in known}

@@ -22,7 +22,7 @@ def load_named_tables(
     inputs: Sequence[str] = (),
     stones: str | None = None,
 ) -> dict[str, list[TractionSeries]]:
-    """Read tables as `experiments.arguments.add_table_form` describes them.
+    """Read tables as `experiments.arguments.add_table_options` describes them.
 
     Args:
         args: options of the command line.

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from experiments.arguments import (
-    add_simulated_arm,
-    add_time,
-    asked_time,
+    add_simulation_options,
+    add_time_options,
     friction_share,
+    requested_time_mode,
 )
 from experiments.rig.deviation_options import add_truth, check_truth, mount_of
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 def add_arm(parser: argparse.ArgumentParser) -> None:
     """Declare the options of arm and operator."""
     parser.add_argument("--fake", action="store_true", help="simulated devices")
-    add_time(parser)
-    add_simulated_arm(parser)
+    add_time_options(parser)
+    add_simulation_options(parser)
     add_truth(parser)
     parser.add_argument(
         "--operator-script", metavar="auto", help="simulated operator, only with --fake"
@@ -37,7 +37,7 @@ def check_arm(args: argparse.Namespace) -> None:
     """
     from acquisition.errors import SettingsError
 
-    if not args.fake and (asked_time(args) or args.operator_script):
+    if not args.fake and (requested_time_mode(args) or args.operator_script):
         raise SettingsError(
             "--fast, --processes and --operator-script work only with --fake.",
             hint="Nothing was started.",
@@ -62,7 +62,7 @@ def fake_options(
     if not args.fake:
         return None
     return FakeOptions(
-        asked_time(args) or "paced",
+        requested_time_mode(args) or "paced",
         args.seed,
         friction_share(args),
         cables=args.cables,

@@ -1,4 +1,4 @@
-"""traction calibrate: guided calibrations of the rig."""
+"""traction calibrate: calibrate a part of the rig in guided steps."""
 
 from __future__ import annotations
 

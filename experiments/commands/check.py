@@ -7,7 +7,12 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import add_time, asked_time, did_you_mean, number_within
+from experiments.arguments import (
+    add_time_options,
+    did_you_mean,
+    number_within,
+    requested_time_mode,
+)
 from experiments.rig.deviation_options import add_truth, check_truth, mount_of
 
 if TYPE_CHECKING:
@@ -25,7 +30,7 @@ _JSON_SCHEMA = 1
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `check`."""
     parser.add_argument("--fake", action="store_true", help="simulated devices")
-    add_time(parser)
+    add_time_options(parser)
     parser.add_argument(
         "--loop-test",
         type=number_within(0.1, 3600, "seconds, e.g. 5"),
@@ -52,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_truth(parser)
     parser.add_argument(
-        "--can-log", type=Path, metavar="FILE", help="write every CAN frame there"
+        "--can-log", type=Path, metavar="FILE", help="write every CAN frame to FILE"
     )
 
 
@@ -105,7 +110,7 @@ def _check(args: argparse.Namespace, settings: Settings, console: Console) -> No
     row = settings.row(args.terrain or first)
     fake: FakeOptions | None = None
     if args.fake:
-        mode = asked_time(args) or "paced"
+        mode = requested_time_mode(args) or "paced"
         fake = FakeOptions(mode, 1, mount=mount_of(args), wrong=args.wrong)
     rig = connect_rig(settings, row, fake)
     console.say("traction check        " + ("SIMULATED" if fake else "LIVE RIG"))

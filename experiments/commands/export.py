@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import add_allow_missing, add_seed
+from experiments.arguments import add_allow_missing_option, add_seed_option
 
 if TYPE_CHECKING:
     from experiments.operator.console import Console
@@ -29,8 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--to", type=Path, metavar="DIR", help="into an empty or new folder"
     )
-    add_allow_missing(parser)
-    add_seed(parser)
+    add_allow_missing_option(parser)
+    add_seed_option(parser)
     trials = parser.add_argument_group("trials: SESSION... --to DIR")
     trials.add_argument(
         "--format",

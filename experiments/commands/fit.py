@@ -6,12 +6,12 @@ import argparse
 from pathlib import Path
 
 from experiments.arguments import (
-    add_analysis,
-    add_covariate,
-    add_pdf,
-    add_scheduler,
-    add_seed,
-    add_table_form,
+    add_analysis_options,
+    add_covariate_option,
+    add_pdf_option,
+    add_scheduler_option,
+    add_seed_option,
+    add_table_options,
 )
 
 EXAMPLES = """\
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="folder of the report",
     )
-    add_table_form(parser)
+    add_table_options(parser)
     parser.add_argument(
         "--stones",
         metavar="NAME=SIZE,..",
@@ -47,11 +47,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="inputs of the models: v_t, F_n and further columns of numbers in every "
         "table, e.g. an angle",
     )
-    add_covariate(parser, "columns of every table, and way, since the last drop of F_t")
-    add_scheduler(parser)
-    add_pdf(parser)
-    add_seed(parser)
-    add_analysis(parser)
+    add_covariate_option(
+        parser, "columns of every table, and way, since the last drop of F_t"
+    )
+    add_scheduler_option(parser)
+    add_pdf_option(parser)
+    add_seed_option(parser)
+    add_analysis_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import add_table_form
+from experiments.arguments import add_table_options
 
 if TYPE_CHECKING:
     from analysis.data.series import TractionSeries
@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=100,
         help="samples of motion per answer: 50, 100 or 200 are 0.5, 1 or 2 s (100)",
     )
-    add_table_form(parser)
+    add_table_options(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 

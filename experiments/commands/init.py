@@ -1,4 +1,4 @@
-"""traction init: write rig.toml and matrix.toml to be edited."""
+"""traction init: write rig.toml and matrix.toml for editing."""
 
 import argparse
 from pathlib import Path

@@ -2,7 +2,7 @@
 
 import argparse
 
-from experiments.arguments import add_author
+from experiments.arguments import add_author_option
 
 EXAMPLES = """\
   traction note S012 "heater on since noon"     on the session
@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="[TRIAL] TEXT",
         help="T04 or T04a where one trial is meant, then the remark",
     )
-    add_author(parser)
+    add_author_option(parser)
 
 
 def run(args: argparse.Namespace) -> int:

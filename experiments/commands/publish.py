@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from experiments.arguments import add_allow_missing, add_seed
+from experiments.arguments import add_allow_missing_option, add_seed_option
 
 EXAMPLES = """\
   traction publish S012 S013 --to crate --author "Family, Given" --licence CC-BY-4.0
@@ -38,8 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--description", default="", metavar="TEXT", help="a sentence or two"
     )
-    add_allow_missing(parser)
-    add_seed(parser)
+    add_allow_missing_option(parser)
+    add_seed_option(parser)
 
 
 def run(args: argparse.Namespace) -> int:

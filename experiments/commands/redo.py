@@ -2,7 +2,7 @@
 
 import argparse
 
-from experiments.arguments import add_reopening
+from experiments.arguments import add_reopening_options
 
 EXAMPLES = """\
   traction redo S012 T04                    trial 4 again, the old one to rejected/
@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--reason", default="", metavar="TEXT", help="reason for the journal"
     )
-    add_reopening(parser)
+    add_reopening_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import add_simulated_arm, friction_share
+from experiments.arguments import add_simulation_options, friction_share
 from experiments.rig.deviation_options import add_truth, mount_of
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ _FAILED = 6
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `rehearse`."""
-    add_simulated_arm(parser)
+    add_simulation_options(parser)
     add_truth(parser)
     parser.add_argument(
         "--trials", type=int, default=10, metavar="N", help="trials per terrain (10)"

@@ -6,7 +6,11 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import add_allow_missing, add_port, number_within
+from experiments.arguments import (
+    add_allow_missing_option,
+    add_port_option,
+    number_within,
+)
 
 if TYPE_CHECKING:
     from experiments.operator.console import Console
@@ -41,13 +45,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="a bus log of --can-log, or of candump -L",
     )
-    add_allow_missing(parser)
+    add_allow_missing_option(parser)
     parser.add_argument(
         "--serve",
         action="store_true",
         help="serve the trial to viewers on this computer; needs traction[live]",
     )
-    add_port(parser, "--serve: ")
+    add_port_option(parser, "--serve: ")
     parser.add_argument("--summary", action="store_true", help="totals only")
 
 

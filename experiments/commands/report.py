@@ -7,17 +7,17 @@ from dataclasses import replace
 from pathlib import Path
 
 from experiments.arguments import (
-    add_allow_missing,
-    add_analysis,
-    add_covariate,
-    add_pdf,
-    add_scheduler,
-    add_seed,
+    add_allow_missing_option,
+    add_analysis_options,
+    add_covariate_option,
+    add_pdf_option,
+    add_scheduler_option,
+    add_seed_option,
 )
 
 EXAMPLES = """\
   traction report S012                             one session, in its own folder
-  traction report --all --what-if smoothing=25     the study under another choice"""
+  traction report --all --what-if smoothing=25     the study with another choice"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,15 +33,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="folder of the report and of what it keeps, e.g. where the data can only "
         "be read (that of the session, or DATA/study)",
     )
-    add_scheduler(parser)
-    add_covariate(
+    add_scheduler_option(parser)
+    add_covariate_option(
         parser, "height (of the sole), way (since the last drop), lateral, tilt, moment"
     )
-    add_pdf(parser)
+    add_pdf_option(parser)
     parser.add_argument("--json", action="store_true", help="what was made, as JSON")
-    add_allow_missing(parser)
-    add_seed(parser)
-    add_analysis(parser)
+    add_allow_missing_option(parser)
+    add_seed_option(parser)
+    add_analysis_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import add_reopening
+from experiments.arguments import add_reopening_options
 
 if TYPE_CHECKING:
     from experiments.session.store import SessionFolder
@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "session", nargs="?", metavar="SESSION", help="S012, a folder, or left out"
     )
-    add_reopening(parser)
+    add_reopening_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -6,10 +6,10 @@ import argparse
 from typing import TYPE_CHECKING
 
 from experiments.arguments import (
-    add_recording,
-    asked_time,
+    add_recording_options,
     data_option,
     friction_share,
+    requested_time_mode,
 )
 from experiments.rig.deviation_options import add_truth, check_truth, mount_of
 
@@ -25,7 +25,7 @@ EXAMPLES = """\
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `run`."""
-    add_recording(parser)
+    add_recording_options(parser)
     add_truth(parser)
 
 
@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     fake: FakeOptions | None = None
     if args.fake:
         fake = FakeOptions(
-            asked_time(args) or "paced",
+            requested_time_mode(args) or "paced",
             args.seed,
             friction,
             args.pace,
@@ -107,7 +107,7 @@ def _as_reopening(args: argparse.Namespace, request: SessionRequest) -> ResumeRe
         data=request.data,
         config=request.config,
         console=request.console,
-        mode=asked_time(args),
+        mode=requested_time_mode(args),
         is_fake=args.fake,
         operator=request.operator_name,
         script=args.operator_script,
@@ -120,7 +120,7 @@ def _check_arguments(args: argparse.Namespace) -> None:
     from acquisition.errors import SettingsError
 
     nothing = "Nothing was started."
-    time = asked_time(args)
+    time = requested_time_mode(args)
     simulated = (time, args.fault, args.operator_script)
     if not args.fake and any(simulated):
         raise SettingsError(

@@ -1,4 +1,4 @@
-"""traction setup: print or install system files for the computer at the arm."""
+"""traction setup: print or install the system files of the host computer."""
 
 from __future__ import annotations
 

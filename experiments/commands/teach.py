@@ -1,4 +1,4 @@
-"""traction teach: teach by hand where a container stands."""
+"""traction teach: teach the location of a container by leading the arm."""
 
 from __future__ import annotations
 

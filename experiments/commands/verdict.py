@@ -2,7 +2,7 @@
 
 import argparse
 
-from experiments.arguments import add_author
+from experiments.arguments import add_author_option
 
 EXAMPLES = """\
   traction verdict S012 T04 reject "foot tilted"   T04 goes to rejected/
@@ -15,7 +15,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("trial", metavar="TRIAL", help="T04, or T04a of rejected/")
     parser.add_argument("verdict", choices=("keep", "reject"), help="the new verdict")
     parser.add_argument("reason", nargs="+", metavar="REASON", help="why")
-    add_author(parser)
+    add_author_option(parser)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -2,7 +2,7 @@
 
 import argparse
 
-from experiments.arguments import add_port
+from experiments.arguments import add_port_option
 
 EXAMPLES = """\
   traction watch                the session that is recorded, at ws://127.0.0.1:8765
@@ -14,7 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "session", nargs="?", metavar="SESSION", help="S012 (the one that is recorded)"
     )
-    add_port(parser)
+    add_port_option(parser)
 
 
 def run(args: argparse.Namespace) -> int:

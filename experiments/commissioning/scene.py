@@ -10,7 +10,7 @@ from acquisition.control_loop.powered_tests import PoweredTestGoal
 from acquisition.devices import SafetyMode
 from acquisition.ipc.loop_client import LoopClient
 from acquisition.simulation import SimulationControl
-from experiments.commissioning.evidence.inputs import present_inputs
+from experiments.commissioning.evidence.inputs import current_inputs
 from experiments.commissioning.recording import Values
 from experiments.messages import FaultContext, fault_text, preflight_error
 from experiments.operator.console import Console
@@ -85,7 +85,7 @@ class Scene:
 
     def inputs(self) -> dict[str, str]:
         """Return the digests of the inputs of steps known now."""
-        return present_inputs(self.rig, self.answers, self.info, self.sensor)
+        return current_inputs(self.rig, self.answers, self.info, self.sensor)
 
     def say(self, text: str) -> None:
         """Print a line above the progress bar."""

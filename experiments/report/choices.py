@@ -83,7 +83,7 @@ class ReportRequest:
 
 
 def analysis_choices(args: argparse.Namespace) -> AnalysisChoices:
-    """Return the choices from the options of `experiments.arguments.add_analysis`.
+    """Return the choices from the options of `add_analysis_options`.
 
     Raises:
         SettingsError: an option is invalid.

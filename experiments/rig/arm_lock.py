@@ -60,7 +60,7 @@ class ArmLock:
         Args:
             interface: python-can's name of the adapter.
             channel: the adapter's name, or the path of a served bus.
-            folders: candidates for the folder of the lock's file, see `lock_folder`.
+            folders: candidates for the folder of the lock file, see `lock_folder`.
 
         Raises:
             PreflightError: another process has the arm, or the file cannot be used.
@@ -113,7 +113,7 @@ def lock_folder(folders: Sequence[Path] = FOLDERS) -> Path:
 
 
 def lock_name(interface: str, channel: str) -> str:
-    """Return the name of the lock's file; links to a path are resolved."""
+    """Return the name of the lock file; links to a path are resolved."""
     if interface == "traction-fake" or "/" in channel:
         channel = os.path.realpath(channel)
     name = quote(f"{interface}:{channel}", safe="")
@@ -123,10 +123,10 @@ def lock_name(interface: str, channel: str) -> str:
 
 
 def _open_safely(path: Path) -> int:
-    """Open the lock's file, creating it if needed; returns its descriptor.
+    """Open the lock file, creating it if needed; returns its descriptor.
 
-    An existing file may come from any user: only a regular file with one name is
-    accepted, without following links or blocking.
+    An existing file may belong to any user: only a regular file with a single hard link
+    is accepted; links are not followed and the call does not block.
     """
     try:
         descriptor = _open_or_create(path)
@@ -153,7 +153,7 @@ def _open_or_create(path: Path) -> int:
             continue  # another program was faster
         os.fchmod(new, _MODE)  # regardless of the umask
         return new
-    raise OSError("it comes and goes")
+    raise OSError("another program keeps creating and removing it")
 
 
 def _write_owner(descriptor: int) -> None:

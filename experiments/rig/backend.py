@@ -67,15 +67,14 @@ class RigBackend(Protocol):
         ...
 
 
-_GATHERED = 130  # cycles per drain of the recorder in this thread, 0.26 s
+_DRAIN_CYCLES = 130  # between drains of the recorder in this thread, 0.26 s
 
 
-class InlineAdvance:
+class InlineLoop:
     """Loop and recorder in this thread: both run only while the console waits.
 
-    The recorder drains as often as it flushes: a separate process drains every 20 ms,
-    but here one long drain costs half of many short ones, and the simulation waits for
-    it.
+    The recorder drains at its flush period, not every 20 ms as in its own process: one
+    long drain takes half the time of many short ones, and the simulation waits for it.
     """
 
     def __init__(self, loop: Loop, recorder: Recorder) -> None:
@@ -91,7 +90,7 @@ class InlineAdvance:
         """Run the loop for `cycles` periods; drain the recorder when due."""
         self._loop.run(cycles)
         self._passed += cycles
-        if self._passed >= _GATHERED:
+        if self._passed >= _DRAIN_CYCLES:
             self._passed = 0
             self._recorder.drain()
         if self._recorder.failure is not None:
@@ -107,7 +106,7 @@ class InProcessBackend:
         self._shared = shared
         self._clock = clock
         self.recorder = Recorder(shared, clock)
-        self._advance_loop: InlineAdvance | None = None  # once the loop runs
+        self._advance_loop: InlineLoop | None = None  # once the loop runs
         self.loop_client = LoopClient(shared, clock, self._advance)
 
     @property
@@ -129,7 +128,7 @@ class InProcessBackend:
         loop_server = self._service.loop_server
         assert loop_server is not None
         loop = Loop(loop_server, self._clock, stats=loop_server.stats)
-        self._advance_loop = InlineAdvance(loop, self.recorder)
+        self._advance_loop = InlineLoop(loop, self.recorder)
         self.loop_client.beat()
 
     def grants(self) -> dict[str, list[Grant]]:
@@ -139,12 +138,11 @@ class InProcessBackend:
     def idle(self) -> bool:
         """Idle the arm; returns whether that is confirmed.
 
-        A running loop does it itself: to the loop, an arm idled by others would look as
-            if
-        the pendant had been pressed.
+        A running loop idles the arm itself: an arm idled by others looks to it like a
+        press of the pendant.
         """
         if self._advance_loop is not None:
-            with suppress(Exception):  # of a failed loop: the arm is idled directly
+            with suppress(Exception):  # the loop failed: idle the arm directly
                 self.loop_client.request(ArmState.IDLE)
                 self._advance_loop.step()
                 return self.loop_client.status.state is ArmState.IDLE

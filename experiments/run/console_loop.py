@@ -33,8 +33,8 @@ TICK = 0.02  # period of the console [s]
 REFRESH_NS = 125_000_000  # period of the live screen
 DAMP_SECONDS = 0.2  # from an urgent stop to idle
 _OWN_QUIT = frozenset({Prompt.REVIEW, Prompt.READY})  # [q] has another meaning
-# Prompts at which the arm has nothing to do.
-_AT_REST = frozenset(
+# Prompts at which the arm only waits.
+_WAITING_PROMPTS = frozenset(
     {Prompt.REVIEW, Prompt.PAUSED, Prompt.DAMPED, Prompt.UNDO, Prompt.LAY_DOWN}
 )
 _DAMPED = "ARM: damped where it is. [space] once you hold it: then it holds again."
@@ -51,11 +51,11 @@ _POSE_UNRELIABLE = frozenset(
 # States in which the motors are driven.
 _DRIVEN = frozenset({ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE})
 LAY_DOWN_SECONDS = 60.0  # the arm waits this long for the operator, then goes idle
-# Prompts that simulated time ends, not a key.
+# Prompts that end by themselves after simulated time.
 _TIMED_PROMPTS = frozenset({Prompt.RECORDING, Prompt.MOVING, Prompt.LIFT, Prompt.UNDO})
-_SETTLED_NS = 2_000_000_000  # at the others, from the last action to rest
-_REST_TICKS = 50  # ticks of real time per tick of a simulation at rest
-_SLOW = 0.95  # share of real time below which the screen shows it
+_PAUSE_AFTER_NS = 2_000_000_000  # idle time at the other prompts
+_PAUSED_TICKS = 50  # real ticks per simulated tick while paused
+_SLOW = 0.95  # simulation speed below which the screen warns, 1 = real time
 _STAND_TOLERANCE = 0.1  # rad
 _SETTLE_SECONDS = 0.3  # s, time to rest of a holding arm
 _SUPPORT = "Support the arm: it goes idle and sinks slowly. [i]dle"
@@ -92,8 +92,8 @@ class ConsoleLoop:
     _prompt: tuple[Prompt, int, int] | None = field(default=None, init=False)
     _prompt_ns: int = field(default=0, init=False)  # start of `_prompt`
     _acted_ns: int = field(default=0, init=False)  # last key, move, prompt
-    _rests: int = field(default=0, init=False)  # ticks since then
-    _rested_ns: int = field(default=0, init=False)  # real time at rest
+    _paused_ticks: int = field(default=0, init=False)  # since `_acted_ns`
+    _paused_ns: int = field(default=0, init=False)  # real time spent paused
     _is_stopped: bool = field(default=False, init=False)
     _reported: set[Fault | None] = field(  # faults that persist
         default_factory=set[Fault | None], init=False
@@ -142,7 +142,7 @@ class ConsoleLoop:
         return max(0.0, (self.undo_until_ns - self.rig.clock.now_ns()) * 1e-9)
 
     def line(self, name: TrialName) -> str | None:
-        """Advance by 20 ms; returns a note once typed, "" if cancelled, None before.
+        """Advance by 20 ms; return the note, "" if cancelled, None while it is typed.
 
         Raises:
             ArmFaultError, TractionError: as `tick`.
@@ -153,32 +153,32 @@ class ConsoleLoop:
         return self.operator.line(state)
 
     def _advance_time(self, prompt: Prompt) -> None:
-        """Advance by 20 ms, or only wait them in real time.
+        """Advance by 20 ms, or only wait 20 ms while the simulation is paused.
 
-        A person may read a prompt for minutes. Once the simulation is at rest, its time
-        runs at a small fraction of real time: little load, and no time-outs.
+        A person may read a prompt for minutes. Meanwhile simulated time runs at 1/50 of
+        real time, which saves load and avoids time-outs.
         """
         pace = self.rig.pace
-        if pace is not None and is_person(self.operator) and self._is_at_rest(prompt):
-            self._rests += 1
-            if self._rests % _REST_TICKS:
+        if pace is not None and is_person(self.operator) and self._update_pause(prompt):
+            self._paused_ticks += 1
+            if self._paused_ticks % _PAUSED_TICKS:
                 pace.rest(TICK)
-                self._rested_ns += round(TICK * 1e9)
+                self._paused_ns += round(TICK * 1e9)
                 return
         self.loop_client.advance(TICK)
 
-    def _is_at_rest(self, prompt: Prompt) -> bool:
-        """Return whether the simulation is at rest at `prompt`."""
+    def _update_pause(self, prompt: Prompt) -> bool:
+        """Return whether time is paused at `prompt`; a new one or a motion resumes it."""
         simulation = self.rig.simulation
-        is_led = simulation is not None and not simulation.is_hand_done
-        if self._prompt is None or prompt is not self._prompt[0] or is_led:
+        is_moving = simulation is not None and not simulation.is_hand_done
+        if self._prompt is None or prompt is not self._prompt[0] or is_moving:
             self._resume_simulation()
         waited_ns = self.rig.clock.now_ns() - self._acted_ns
-        return prompt not in _TIMED_PROMPTS and waited_ns >= _SETTLED_NS
+        return prompt not in _TIMED_PROMPTS and waited_ns >= _PAUSE_AFTER_NS
 
     def _resume_simulation(self) -> None:
-        """End the rest of the simulation, for a key or a motion."""
-        self._acted_ns, self._rests = self.rig.clock.now_ns(), 0
+        """Resume simulated time after a key or a motion."""
+        self._acted_ns, self._paused_ticks = self.rig.clock.now_ns(), 0
 
     def _advance(
         self, prompt: Prompt, name: TrialName | None, *, is_complete: bool = False
@@ -213,7 +213,7 @@ class ConsoleLoop:
     def _raise_fault(self, prompt: Prompt) -> None:
         """Raise the guard's strictest verdict, unless reported and persistent."""
         control = self.loop_client.status
-        if control.verdict is None or prompt not in _AT_REST:
+        if control.verdict is None or prompt not in _WAITING_PROMPTS:
             self._reported.clear()
         if control.verdict is None:
             return
@@ -244,7 +244,7 @@ class ConsoleLoop:
         self.console.end_panel()
 
     def _refresh(self) -> None:
-        now_ns = self.rig.clock.now_ns() + self._rested_ns
+        now_ns = self.rig.clock.now_ns() + self._paused_ns
         if self._view is None or not self.console.is_live:
             return
         if now_ns - self._shown_ns >= REFRESH_NS:
@@ -298,7 +298,7 @@ class ConsoleLoop:
         self.loop_client.advance(0.1)
 
     def run_in_background(self, work: Callable[[], _T]) -> _T:
-        """Run slow `work` in a thread, with the console's heartbeat going on.
+        """Run slow `work` in a thread while the console keeps its heartbeat.
 
         Raises:
             Exception: that of `work`.
@@ -388,15 +388,16 @@ class ConsoleLoop:
             return True
         self.console.say(
             f"Joint {joint + 1} is {deviation[joint]:.2f} rad from where the foot lies "
-            "on its stand (arm.rest). Lay it there, then [i]dle; Ctrl-C: idle all the "
-            "same."
+            "on its stand (arm.rest). Lay it there, then [i]dle. Ctrl-C idles the arm "
+            "anyway."
         )
         return False
 
     def make_safe(self) -> bool:
         """Idle the arm and abandon an open file; returns whether idle is confirmed.
 
-        Faults of the loop meanwhile are printed: a puck may have missed the command.
+        Faults that the loop detects meanwhile are printed, e.g. a puck that missed the
+        command.
         """
         backend = self.rig.backend
         backend.recorder.abandon()

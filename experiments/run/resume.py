@@ -11,7 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from acquisition.clock import SystemClock
 from acquisition.errors import SessionError, SettingsError
-from experiments.arguments import PACES, TimeMode, asked_time
+from experiments.arguments import PACES, TimeMode, requested_time_mode
 from experiments.messages import CATALOGUE
 from experiments.operator.console import WARNING, Console
 from experiments.operator.keys import KeyAction
@@ -105,7 +105,7 @@ class ResumeRequest:
         mode: mode of simulated time; None = as before.
         is_fake: whether a simulated session is expected.
         is_forced: record under other conditions, too.
-        allow_missing: go on without kept trials that are missing or changed.
+        allow_missing: continue without kept trials that are missing or changed.
         operator: name; empty = that of the session.
         script: script of an operator; None = the keyboard.
         can_log: log file of the bus.
@@ -131,7 +131,7 @@ def resume_request(args: argparse.Namespace) -> ResumeRequest:
         data=args.data,
         config=args.config,
         console=Console(color=not args.no_color, goes_on=True),
-        mode=asked_time(args),
+        mode=requested_time_mode(args),
         is_fake=args.fake,
         is_forced=args.force,
         allow_missing=args.allow_missing,

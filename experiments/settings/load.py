@@ -233,7 +233,7 @@ def _read_table(text: str, name: str) -> dict[str, Any]:
     if problem := format_problem(table.get("version")):
         raise SettingsError(
             f"{name} {problem}.",
-            hint="traction init DIR writes one to be edited. Nothing was started.",
+            hint="traction init DIR writes one to edit. Nothing was started.",
         )
     return {key: value for key, value in table.items() if key != "version"}
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
-from experiments.commissioning.evidence.inputs import inputs_of, present_inputs
+from experiments.commissioning.evidence.inputs import current_inputs, inputs_of
 from experiments.commissioning.evidence.order import GATED, StepId
 from experiments.commissioning.evidence.record import (
     NAME,
@@ -42,7 +42,7 @@ def sound_record(
     rig: Rig, info: ArmInfo, steps: Sequence[StepId] = GATED
 ) -> Commissioning:
     """Return a record of `steps` for a started arm; all steps allow driving it."""
-    present = present_inputs(rig, rig.backend.ask(LastAnswers()), info)
+    present = current_inputs(rig, rig.backend.ask(LastAnswers()), info)
     now = datetime.fromtimestamp(rig.clock.utc_ns() // 1_000_000_000, UTC)
     return record_of(steps, present, now)
 

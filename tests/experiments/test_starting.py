@@ -119,5 +119,5 @@ def test_a_removed_working_folder_is_reported(tmp_path):
         env={**os.environ, "TMPDIR": str(tmp_path), "PYTHONPATH": str(ROOT)},
     )
     assert done.returncode == 2
-    assert "The folder this was started in is gone" in done.stderr
+    assert "The working directory is missing" in done.stderr
     assert list(tmp_path.iterdir()) == []  # no log of a bug

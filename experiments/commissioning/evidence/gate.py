@@ -7,7 +7,7 @@ from datetime import UTC, datetime, timedelta
 from acquisition.errors import IDLE_ARM, PreflightError, TractionError
 from experiments.commissioning.evidence.daily_record import COUNTS_FOR, read_history
 from experiments.commissioning.evidence.daily_record import FIELD as DAILY_FIELD
-from experiments.commissioning.evidence.inputs import present_inputs
+from experiments.commissioning.evidence.inputs import current_inputs
 from experiments.commissioning.evidence.order import (
     BASES,
     GATED,
@@ -143,7 +143,7 @@ def check_commissioned(
         if record is not None and record.is_simulated:
             record = None  # not of a real arm
         answers = rig.backend.ask(LastAnswers())
-        present = present_inputs(rig, answers, info, sensor)
+        present = current_inputs(rig, answers, info, sensor)
         inputs = {
             name: digest for name, digest in present.items() if name not in made_anew
         }

@@ -1,4 +1,7 @@
-"""Present inputs of the steps: digests by the names of `order.BASES`."""
+"""Digests of the current inputs of the commissioning steps, by name in `order.BASES`.
+
+A step whose inputs have changed since its record is stale.
+"""
 
 import hashlib
 import json
@@ -16,17 +19,17 @@ _MOTOR = ("IPNM", "POLES", "MT")
 _SENSOR = ("model", "serial_number", "firmware")
 
 
-def present_inputs(
+def current_inputs(
     rig: Rig,
-    answers: Sequence[Mapping[str, int | None]] = (),
+    puck_properties: Sequence[Mapping[str, int | None]] = (),
     info: ArmInfo | None = None,
     sensor: Mapping[str, str] | None = None,
 ) -> dict[str, str]:
-    """Return the digests of all inputs known now.
+    """Return the digests of all inputs that are currently known.
 
     Args:
         rig: the rig with its settings and calibrations.
-        answers: properties of pucks 1 to 7; () = not read.
+        puck_properties: properties of pucks 1 to 7; () = not read.
         info: result of the start; None = not started.
         sensor: identity of the wrist sensor; None = not opened.
     """
@@ -35,7 +38,7 @@ def present_inputs(
     zero = arm.pop("mech_at_home")
     texts, feet = rig.settings.calibrations, section.feet
     parts = (section.ft_sensor, *feet.values())
-    of_sensor, *of_feet = (
+    sensor_calibration, *foot_calibrations = (
         texts.get(f"{PREFIX}{part.calibration}", "") for part in parts
     )
     content: dict[str, Any] = {
@@ -43,8 +46,11 @@ def present_inputs(
         "[safety]": section.safety.model_dump(mode="json"),
         "[limits]": section.limits.model_dump(mode="json"),
         "[arm]": arm,
-        "[feet]": [{name: foot.plain() for name, foot in feet.items()}, of_feet],
-        "[ft_sensor]": [section.ft_sensor.model_dump(mode="json"), of_sensor],
+        "[feet]": [
+            {name: foot.plain() for name, foot in feet.items()},
+            foot_calibrations,
+        ],
+        "[ft_sensor]": [section.ft_sensor.model_dump(mode="json"), sensor_calibration],
         "[gravity]": [
             section.gravity.model_dump(mode="json"),
             rig.calibrations.gravity,
@@ -60,9 +66,9 @@ def present_inputs(
             texts.get(f"{PREFIX}{rig.row.calibration}", ""),
         ],
     }
-    if answers:
-        content["pucks"] = _properties(answers, _PUCK)
-        content["motors"] = _properties(answers, _MOTOR)
+    if puck_properties:
+        content["pucks"] = _properties(puck_properties, _PUCK)
+        content["motors"] = _properties(puck_properties, _MOTOR)
     if info is not None and (module := info.module_identity()):
         content["module"] = module
     if sensor is not None and not _is_unknown(sensor, "serial_number"):
@@ -72,19 +78,19 @@ def present_inputs(
     return {name: _digest(part) for name, part in content.items()}
 
 
-def inputs_of(step: StepId, present: Mapping[str, str]) -> dict[str, str]:
-    """Return the present digests of the inputs of a step."""
-    return {name: present[name] for name in bases_of(step) if name in present}
+def inputs_of(step: StepId, current: Mapping[str, str]) -> dict[str, str]:
+    """Return the current digests of the inputs of a step."""
+    return {name: current[name] for name in bases_of(step) if name in current}
 
 
 def _properties(
-    answers: Sequence[Mapping[str, int | None]], names: Sequence[str]
+    puck_properties: Sequence[Mapping[str, int | None]], names: Sequence[str]
 ) -> list[list[int | None]]:
-    return [[answer.get(name) for name in names] for answer in answers]
+    return [[puck.get(name) for name in names] for puck in puck_properties]
 
 
 def _is_unknown(sensor: Mapping[str, str], name: str) -> bool:
-    """Return whether a sensor does not report a property, or not always."""
+    """Return whether the sensor leaves a property unreported, always or at times."""
     return sensor.get(name, "unknown").startswith("unknown")
 
 

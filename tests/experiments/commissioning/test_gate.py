@@ -12,7 +12,7 @@ from experiments.commissioning.evidence.daily_record import (
     write_history,
 )
 from experiments.commissioning.evidence.gate import check_commissioned
-from experiments.commissioning.evidence.inputs import inputs_of, present_inputs
+from experiments.commissioning.evidence.inputs import current_inputs, inputs_of
 from experiments.commissioning.evidence.order import GATED, ORDER, StepId
 from experiments.commissioning.evidence.record import NAME, Raw, write_commissioning
 from experiments.operator.console import BAD, GOOD, WARNING
@@ -115,7 +115,7 @@ def test_a_sound_record_passes_and_recordings_name_the_open_steps(config):
 def test_a_record_of_every_step_is_complete(config):
     arm = Arm(config)
     record = sound_record(arm.rig, arm.info)
-    present = present_inputs(arm.rig, arm.rig.backend.ask(LastAnswers()), arm.info)
+    present = current_inputs(arm.rig, arm.rig.backend.ask(LastAnswers()), arm.info)
     for step in ORDER[len(GATED) :]:
         subject = "S0" if step is StepId.CONTAINER else ""
         inputs = inputs_of(step, present)

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from experiments.commissioning.evidence.gate import lacks
-from experiments.commissioning.evidence.inputs import present_inputs
+from experiments.commissioning.evidence.inputs import current_inputs
 from experiments.commissioning.evidence.order import BASES, ORDER, REPORTED_BASES
 from experiments.preflight.connecting import connect_rig
 from experiments.rig.requests import LastAnswers, OpenSensor, StartArm
@@ -66,14 +66,14 @@ def sound(tmp_path_factory):
 
 def stale(sound, present):
     """The steps that are stale with the inputs `present`."""
-    lacking = lacks(commissioned(present_inputs(*sound)), present, NOON)
+    lacking = lacks(commissioned(current_inputs(*sound)), present, NOON)
     assert all(": stale: " in lack.text for lack in lacking)
     return tuple(lack.step for lack in lacking)
 
 
 def test_nothing_is_stale_where_nothing_changed(sound, tmp_path):
     write_config(tmp_path)
-    assert stale(sound, present_inputs(*connected(tmp_path))) == ()
+    assert stale(sound, current_inputs(*connected(tmp_path))) == ()
 
 
 @pytest.mark.parametrize("name", SETTINGS)
@@ -82,7 +82,7 @@ def test_a_changed_section_makes_its_steps_stale(sound, tmp_path, name):
     file, old, new = SETTINGS[name]
     path = tmp_path / file
     path.write_text(changed(path.read_text(), old, new))
-    present = present_inputs(*connected(tmp_path))
+    present = current_inputs(*connected(tmp_path))
     assert stale(sound, present) == BASES[name].steps
 
 
@@ -94,7 +94,7 @@ def test_a_changed_puck_property_makes_its_steps_stale(sound, joint, name):
     assert other[joint - 1][name] is not None
     other[joint - 1][name] += 1
     basis = "pucks" if name in PUCK else "motors"
-    assert stale(sound, present_inputs(rig, other, info, sensor)) == BASES[basis].steps
+    assert stale(sound, current_inputs(rig, other, info, sensor)) == BASES[basis].steps
 
 
 @pytest.mark.parametrize(
@@ -117,14 +117,14 @@ def test_another_safety_module_or_other_limits_make_its_steps_stale(sound, chang
     rig, answers, info, sensor = sound
     assert info.safety_defaults == (2048, 4096, 4731, 5204)
     other = replace(info, **change(info))
-    present = present_inputs(rig, answers, other, sensor)
+    present = current_inputs(rig, answers, other, sensor)
     assert stale(sound, present) == BASES["module"].steps
 
 
 def test_a_module_without_a_serial_number_makes_no_step_stale(sound):
     rig, answers, info, sensor = sound
     silent = replace(info, safety_serial=None)
-    assert stale(sound, present_inputs(rig, answers, silent, sensor)) == ()
+    assert stale(sound, current_inputs(rig, answers, silent, sensor)) == ()
 
 
 SENSOR_IDENTITY = {"serial_number": "BFT-1", "firmware": "3.2"}  # once it has booted
@@ -134,8 +134,8 @@ SENSOR_IDENTITY = {"serial_number": "BFT-1", "firmware": "3.2"}  # once it has b
 def test_another_wrist_sensor_makes_its_steps_stale(sound, name):
     rig, answers, info, sensor = sound
     full = {**sensor, **SENSOR_IDENTITY}
-    before = commissioned(present_inputs(rig, answers, info, full))
-    other = present_inputs(rig, answers, info, {**full, name: f"{full[name]}1"})
+    before = commissioned(current_inputs(rig, answers, info, full))
+    other = current_inputs(rig, answers, info, {**full, name: f"{full[name]}1"})
     lacking = [lack.step for lack in lacks(before, other, NOON)]
     assert tuple(lacking) == BASES["sensor"].steps
 
@@ -143,8 +143,8 @@ def test_another_wrist_sensor_makes_its_steps_stale(sound, name):
 def test_a_sensor_of_unknown_identity_makes_no_step_stale(sound):
     rig, answers, info, sensor = sound
     assert sensor["serial_number"].startswith("unknown")
-    silent = present_inputs(rig, answers, info, sensor)
-    full = present_inputs(rig, answers, info, {**sensor, **SENSOR_IDENTITY})
+    silent = current_inputs(rig, answers, info, sensor)
+    full = current_inputs(rig, answers, info, {**sensor, **SENSOR_IDENTITY})
     assert lacks(commissioned(full), silent, NOON) == []
     assert lacks(commissioned(silent), full, NOON) == []
 
@@ -165,7 +165,7 @@ def test_a_container_measured_again_makes_its_steps_stale(sound):
         settings = replace(rig.settings, calibrations=texts)
         return replace(rig, row=row, settings=settings)
 
-    before = commissioned(present_inputs(measured("incline = 0.1"), answers, info))
-    again = present_inputs(measured("incline = 0.2"), answers, info)
+    before = commissioned(current_inputs(measured("incline = 0.1"), answers, info))
+    again = current_inputs(measured("incline = 0.2"), answers, info)
     lacking = [lack.step for lack in lacks(before, again, NOON)]
     assert tuple(lacking) == BASES["terrain"].steps

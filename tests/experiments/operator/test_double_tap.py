@@ -9,7 +9,7 @@ from tests.experiments.program import journal, run_watched, write_config
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 
 RATE = 500
-REST = 3.0  # N, of a foot that rests on the ground
+REST = 3.0  # N, load of a resting foot
 
 
 def pressed(*presses, lasts=3.0, rest=REST, force=12.0):
@@ -22,11 +22,11 @@ def pressed(*presses, lasts=3.0, rest=REST, force=12.0):
 
 
 def is_tap(t, F_n, v_t, portion=10):
-    """Whether samples, fed twenty milliseconds at a time, are a double tap."""
-    watch = DoubleTap()
-    parts = range(0, len(t), portion)
-    fed = [slice(max(0, i - 7), i + portion) for i in parts]  # some seen twice
-    return any(watch.feed(t[s], F_n[s], v_t[s]) for s in fed)
+    """Return whether the detector, fed 20 ms at a time, finds a double tap."""
+    detector = DoubleTap()
+    starts = range(0, len(t), portion)
+    chunks = [slice(max(0, i - 7), i + portion) for i in starts]  # overlap: 7 samples
+    return any(detector.feed(t[s], F_n[s], v_t[s]) for s in chunks)
 
 
 @pytest.mark.parametrize(
@@ -35,7 +35,7 @@ def is_tap(t, F_n, v_t, portion=10):
         ([(0.5, 0.1), (0.9, 0.1)], True),
         ([(0.5, 0.1), (1.49, 0.1)], True),
         ([(0.5, 0.1), (1.52, 0.1)], False),  # more than a second apart
-        ([(0.5, 0.1), (1.6, 0.1), (2.2, 0.1)], True),  # the second one begins anew
+        ([(0.5, 0.1), (1.6, 0.1), (2.2, 0.1)], True),  # counts from the second press
         ([(0.5, 0.1)], False),
         ([(0.5, 0.5), (1.1, 0.1)], False),  # leaning on the foot is no tap
         ([(0.5, 0.1), (0.8, 0.5)], False),
@@ -47,7 +47,7 @@ def test_two_short_presses_in_quick_succession_are_a_double_tap(presses, expecte
     assert is_tap(*pressed(*presses)) is expected
 
 
-def test_a_press_counts_beyond_a_force_only():
+def test_a_press_needs_a_minimum_force():
     presses = [(0.5, 0.1), (0.9, 0.1)]
     assert not is_tap(*pressed(*presses, force=7.9))
     assert is_tap(*pressed(*presses, force=8.1))
@@ -74,9 +74,10 @@ def test_samples_of_nan_are_no_double_tap():
 
 
 def test_a_normal_push_is_no_double_tap(recorded):
-    """Nor is a push five times as hard, which is one long press.
+    """A push with five times the load is one long press, so no double tap either.
 
-    A push twice as hard would come in presses and pauses where the arm sticks.
+    Twice the load is not tested: where the arm sticks, F_n would cross the thresholds
+    repeatedly.
     """
     for name in ("T01", "T02"):
         path = recorded.folder / "trials" / f"{name}.mcap"
@@ -84,15 +85,15 @@ def test_a_normal_push_is_no_double_tap(recorded):
         truth = TrialReader(path.with_suffix(".truth.mcap")).truth().data
         v_t, _, F_n = cycles["traction"].T
         host_ns = cycles["host_ns"].astype(float)
-        # What the foot presses grows, not what the sensor adds to it.
-        pressed_with = np.interp(host_ns, truth["host_ns"], truth["traction"][:, 2])
-        for harder in (1.0, 5.0):
-            shown = F_n + (harder - 1.0) * pressed_with
-            assert not is_tap(host_ns * 1e-9, shown, v_t)
+        # Scale the true load only, not the sensor's error.
+        true_F_n = np.interp(host_ns, truth["host_ns"], truth["traction"][:, 2])
+        for factor in (1.0, 5.0):
+            measured = F_n + (factor - 1.0) * true_F_n
+            assert not is_tap(host_ns * 1e-9, measured, v_t)
 
 
 def test_a_stick_slip_push_is_no_double_tap():
-    """Load and speed of a foot that slips five times a second and sticks between."""
+    """The foot slips five times a second and sticks in between."""
     t = np.arange(0.0, 10.0, 1 / RATE)
     phase = t * 5.0 % 1.0
     v_t = np.where(phase > 0.8, 0.3, 0.0)
@@ -122,7 +123,7 @@ def test_a_double_tap_starts_a_trial_and_keeps_it(handsfree, tmp_path):
     assert [e["event"] for e in journal(seen.folder)].count("trial-kept") == 1
 
 
-def test_without_the_setting_a_double_tap_does_nothing(config, tmp_path):
+def test_a_double_tap_is_ignored_without_the_setting(config, tmp_path):
     seen = run_watched(config, tmp_path, 1, press=tapping)
     assert seen.done.code == 5
     assert "trial-started" not in [e["event"] for e in journal(seen.folder)]

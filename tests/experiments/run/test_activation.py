@@ -115,7 +115,7 @@ def test_a_bus_that_is_down_is_named_instead_of_the_pucks():
     assert "CAN interface" in refused.value.message
 
 
-def test_a_pressed_stop_is_named_instead_of_the_pucks():
+def test_an_e_stop_is_reported_instead_of_the_pucks():
     loop = bench(fresh=0, state=ArmState.IDLE)
     loop.loop_client.status.safety = SafetyMode.E_STOP
     with pytest.raises(PreflightError) as refused:

@@ -53,7 +53,7 @@ def test_a_faulty_rig_is_refused_and_nothing_is_created(config, tmp_path, fault,
     assert not data.exists()
 
 
-# --- the sensor stops in a trial: the trial is lost, the session is not ---------------
+# --- the sensor stops: the trial is rejected, the session continues -------------------
 
 
 def test_a_stale_sensor_interrupts_the_trial_and_it_is_redone(stale):
@@ -77,7 +77,7 @@ def test_a_stale_sensor_is_reported_with_age_limit_and_arm_state(stale):
     assert "[space] records again." in line
 
 
-def test_an_interrupted_trial_is_kept_among_the_rejected(stale):
+def test_an_interrupted_trial_is_saved_in_the_rejected_folder(stale):
     path = stale.folder / "rejected" / "T01a.mcap"
     fields = sidecar(path)
     assert verify_file(path).sha256 == fields["sha256"] == digest(path)
@@ -86,8 +86,8 @@ def test_an_interrupted_trial_is_kept_among_the_rejected(stale):
     assert path.with_suffix(".truth.mcap").exists()
     reader = TrialReader(path)
     assert reader.metadata["result"]["stop_reason"] == "ft-stale"
-    lasted = np.ptp(reader.cycles().data["host_ns"].astype(float)) * 1e-9
-    assert lasted == pytest.approx(2.0, abs=0.07)  # pre-roll, 1 s, three ticks
+    duration = np.ptp(reader.cycles().data["host_ns"].astype(float)) * 1e-9
+    assert duration == pytest.approx(2.0, abs=0.07)  # pre-roll, 1 s, three ticks
 
 
 def test_the_redone_trial_is_recorded_as_the_second_attempt(stale):
@@ -113,7 +113,7 @@ def test_another_seed_gives_other_cycles(stale, recorded):
     assert mine[:count].tobytes() != other[:count].tobytes()
 
 
-# --- the arm is gone: the session ends ------------------------------------------------
+# --- communication is lost: the session ends ------------------------------------------
 
 
 def test_silence_on_the_bus_ends_the_session(silence):
@@ -151,7 +151,7 @@ def test_the_same_seed_gives_the_same_cycles_byte_for_byte(silence, recorded):
     assert one.tobytes() == two.tobytes()
 
 
-def test_a_pressed_stop_ends_the_session_and_says_when(estop):
+def test_an_e_stop_ends_the_session_and_its_time_is_reported(estop):
     assert estop.done.code == 4
     (line,) = estop.done.err.splitlines()
     assert line.startswith("Stop pressed at 0.4")
@@ -159,13 +159,13 @@ def test_a_pressed_stop_ends_the_session_and_says_when(estop):
     assert journal(estop.folder)[-1]["reason"] == "estop"
 
 
-def test_no_torque_is_commanded_after_a_pressed_stop(estop):
+def test_no_torque_is_commanded_after_an_e_stop(estop):
     assert estop.rig.network.safety_mode is SafetyMode.E_STOP
     last = TrialReader(estop.folder / "faults" / "T01a.flight.mcap").cycles().data[-1]
     assert last["flags"] & SAFETY_MODE_MASK == SafetyMode.E_STOP
     assert not last["torque_command"].any()
 
 
-def test_a_pressed_stop_keeps_the_trial_as_interrupted(estop):
+def test_an_e_stop_saves_the_trial_as_interrupted_and_rejected(estop):
     assert sidecar(estop.folder / "rejected" / "T01a.mcap")["status"] == "interrupted"
     assert list((estop.folder / "trials").iterdir()) == []

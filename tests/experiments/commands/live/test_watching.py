@@ -144,13 +144,13 @@ def test_a_viewer_sees_a_running_session(tmp_path, shared, folder, capsys):
         thread.start()
         try:
             with Viewer(_port(capsys, "is on the screen")) as viewer:
-                viewer.look(lambda v: len(v.channels) == len(LIVE_TOPICS))
+                viewer.receive_until(lambda v: len(v.channels) == len(LIVE_TOPICS))
                 records = []
                 while len(viewer.messages.get("/cycle", ())) < 3:
                     records.append(written(shared, len(records)).tobytes())
                     count = len(viewer.times)
-                    viewer.look(lambda v, count=count: len(v.times) > count)
-                viewer.look(lambda v: "/robot_description" in v.messages)
+                    viewer.receive_until(lambda v, count=count: len(v.times) > count)
+                viewer.receive_until(lambda v: "/robot_description" in v.messages)
         finally:
             over.set()
             thread.join()
@@ -190,13 +190,15 @@ def test_a_viewer_that_seeks_gets_the_samples_from_there(first_trial, capsys):
     thread.start()
     try:
         with Viewer(_port(capsys)) as viewer:
-            viewer.look(lambda v: len(v.channels) == len(LIVE_TOPICS))
+            viewer.receive_until(lambda v: len(v.channels) == len(LIVE_TOPICS))
             start, end = (viewer.info[k] for k in ("dataStartTime", "dataEndTime"))
             at = end["sec"] * 10**9 + end["nsec"] - 100_000_000
             seek = struct.pack("<BBfBQI", 3, 0, 1.0, 1, at, 2) + b"r1"
-            viewer.ask(seek)
-            viewer.look(lambda v: v.messages.get("/cycle", [(0, b"")])[-1][0] >= at)
-            viewer.look(lambda v: v.others)
+            viewer.send_binary(seek)
+            viewer.receive_until(
+                lambda v: v.messages.get("/cycle", [(0, b"")])[-1][0] >= at
+            )
+            viewer.receive_until(lambda v: v.other_binary)
     finally:
         over.set()
         thread.join()

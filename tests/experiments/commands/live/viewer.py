@@ -1,7 +1,7 @@
-"""A viewer of Foxglove's WebSocket protocol, from its description, on a plain socket.
+"""Test client of Foxglove's WebSocket protocol, written from the specification.
 
-Text frames are JSON (serverInfo, advertise; subscribe back), binary ones begin with an
-opcode: 1 = a message (subscription, ns, payload), 2 = time. RFC 6455 carries them.
+Text frames are JSON (received: serverInfo, advertise; sent: subscribe), binary ones
+begin with an opcode: 1 = message (subscription, ns, payload), 2 = time.
 """
 
 import base64
@@ -17,8 +17,8 @@ from typing import Any, Self
 SUBPROTOCOL = "foxglove.sdk.v1"
 _TEXT, _BINARY, _CLOSE = 1, 2, 8
 _MESSAGE, _TIME = 1, 2
-_HEAD = struct.Struct("<BIQ")
-_PATIENCE = 5.0  # s for an answer of the server
+_MESSAGE_HEADER = struct.Struct("<BIQ")
+_TIMEOUT = 5.0  # s
 
 
 @dataclass
@@ -31,7 +31,7 @@ class Viewer:
         channels: advertised channels, by topic.
         messages: (ns, payload) by topic, in order.
         times: times sent by the server [ns].
-        others: other binary messages.
+        other_binary: binary messages of other opcodes.
     """
 
     port: int
@@ -41,10 +41,10 @@ class Viewer:
         default_factory=dict[str, list[tuple[int, bytes]]]
     )
     times: list[int] = field(default_factory=list[int])
-    others: list[bytes] = field(default_factory=list[bytes])
+    other_binary: list[bytes] = field(default_factory=list[bytes])
 
     def __post_init__(self) -> None:
-        self._socket = socket.create_connection(("127.0.0.1", self.port), _PATIENCE)
+        self._socket = socket.create_connection(("127.0.0.1", self.port), _TIMEOUT)
         key = base64.b64encode(os.urandom(16)).decode()
         lines = (
             "GET / HTTP/1.1",
@@ -56,31 +56,31 @@ class Viewer:
             f"Sec-WebSocket-Protocol: {SUBPROTOCOL}",
         )
         self._socket.sendall("\r\n".join([*lines, "", ""]).encode())
-        self._data = b""
-        while b"\r\n\r\n" not in self._data:
-            self._more()
-        head, _, self._data = self._data.partition(b"\r\n\r\n")
+        self._buffer = b""
+        while b"\r\n\r\n" not in self._buffer:
+            self._fill_buffer()
+        head, _, self._buffer = self._buffer.partition(b"\r\n\r\n")
         if b" 101 " not in head.splitlines()[0]:
             raise ConnectionError(head.decode(errors="replace"))
         self._topics: dict[int, str] = {}
 
-    def look(self, until: Callable[["Viewer"], object]) -> "Viewer":
-        """Take frames until `until(self)` is true.
+    def receive_until(self, condition: Callable[["Viewer"], object]) -> "Viewer":
+        """Receive frames until `condition(self)` is true.
 
         Raises:
-            ConnectionError: the server hung up.
+            ConnectionError: the server closed the connection.
         """
-        while not until(self):
-            kind, body = self._frame()
+        while not condition(self):
+            kind, body = self._read_frame()
             if kind == _TEXT:
-                self._hear(json.loads(body))
+                self._on_text(json.loads(body))
             elif kind == _BINARY:
-                self._take(body)
+                self._on_binary(body)
             elif kind == _CLOSE:
                 raise ConnectionError("closed")
         return self
 
-    def ask(self, body: bytes) -> None:
+    def send_binary(self, body: bytes) -> None:
         """Send a binary message."""
         self._send(_BINARY, body)
 
@@ -95,7 +95,7 @@ class Viewer:
     ) -> None:
         self._socket.close()
 
-    def _hear(self, message: dict[str, Any]) -> None:
+    def _on_text(self, message: dict[str, Any]) -> None:
         if message["op"] == "serverInfo":
             self.info = message
         elif message["op"] == "advertise":
@@ -106,24 +106,24 @@ class Viewer:
             text = json.dumps({"op": "subscribe", "subscriptions": wanted})
             self._send(_TEXT, text.encode())
 
-    def _take(self, body: bytes) -> None:
+    def _on_binary(self, body: bytes) -> None:
         if body[0] == _MESSAGE:
-            _, subscription, t_ns = _HEAD.unpack_from(body)
+            _, subscription, t_ns = _MESSAGE_HEADER.unpack_from(body)
             topic = self._topics[subscription]
-            row = (t_ns, body[_HEAD.size :])
+            row = (t_ns, body[_MESSAGE_HEADER.size :])
             self.messages.setdefault(topic, []).append(row)
         elif body[0] == _TIME:
             self.times.append(struct.unpack_from("<Q", body, 1)[0])
         else:
-            self.others.append(body)
+            self.other_binary.append(body)
 
-    def _frame(self) -> tuple[int, bytes]:
-        first, second = self._bytes(2)
+    def _read_frame(self) -> tuple[int, bytes]:
+        first, second = self._read(2)
         length = second & 0x7F
         if length >= 126:
             size = 2 if length == 126 else 8
-            length = int.from_bytes(self._bytes(size), "big")
-        return first & 0x0F, self._bytes(length)
+            length = int.from_bytes(self._read(size), "big")
+        return first & 0x0F, self._read(length)
 
     def _send(self, kind: int, body: bytes) -> None:
         mask = os.urandom(4)
@@ -136,14 +136,14 @@ class Viewer:
         masked = bytes(byte ^ mask[i % 4] for i, byte in enumerate(body))
         self._socket.sendall(head + mask + masked)
 
-    def _bytes(self, count: int) -> bytes:
-        while len(self._data) < count:
-            self._more()
-        taken, self._data = self._data[:count], self._data[count:]
-        return taken
+    def _read(self, count: int) -> bytes:
+        while len(self._buffer) < count:
+            self._fill_buffer()
+        data, self._buffer = self._buffer[:count], self._buffer[count:]
+        return data
 
-    def _more(self) -> None:
+    def _fill_buffer(self) -> None:
         data = self._socket.recv(65536)
         if not data:
-            raise ConnectionError("the server hung up")
-        self._data += data
+            raise ConnectionError("the server closed the connection")
+        self._buffer += data
