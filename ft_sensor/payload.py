@@ -1,7 +1,9 @@
 """Contact force and slip velocity: from the sensor's reading to force on the foot.
 
-Pure functions, used live in the loop and offline by the analysis. With f the load on
-the sensor, m_b and c_b mass and centre of mass below the gauges, g_w = (0, 0, -g):
+Pure functions, used live in the loop and offline by the analysis. With (f_raw, n_raw)
+the raw wrench, (b, b_n) its bias, s = +1 or -1 the sign of the sensor, m_b and c_b mass
+and centre of mass below the gauges, R_WS the orientation of the sensor in the base
+frame and g_w = (0, 0, -g):
 
     F_c = s (f_raw - b) - m_b R_WS^T g_w        in the sensor frame
     n_c = s (n_raw - b_n) - c_b x m_b R_WS^T g_w
@@ -49,14 +51,15 @@ class Payload:
     rotation: Array
     sign: float
     bias: Array
-    _weighing: Array = field(init=False, repr=False, compare=False)  # (3, 6)
+    # (3, 6): base z axis in frame 7 -> gravity wrench in the sensor frame.
+    _gravity_map: Array = field(init=False, repr=False, compare=False)
     # An array, because numpy takes twice as long to multiply by a Python float.
     _signs: Array = field(init=False, repr=False, compare=False)  # (6,)
 
     def __post_init__(self) -> None:
-        turned = self.rotation @ cross_matrix(self.com).T
-        weighing = -self.mass * GRAVITY * np.hstack([self.rotation, turned])
-        object.__setattr__(self, "_weighing", weighing)
+        rotated_cross = self.rotation @ cross_matrix(self.com).T
+        gravity_map = -self.mass * GRAVITY * np.hstack([self.rotation, rotated_cross])
+        object.__setattr__(self, "_gravity_map", gravity_map)
         object.__setattr__(self, "_signs", np.full(6, self.sign))
 
     def tared(self, reading: Floats, rotation_base_7: Array) -> "Payload":
@@ -76,7 +79,7 @@ class Payload:
             rotation_base_7: orientation(s) of frame 7, shape (..., 3, 3).
         """
         # The last row of the orientation is the base's z axis in frame 7.
-        return rotation_base_7[..., 2, :].dot(self._weighing)
+        return rotation_base_7[..., 2, :].dot(self._gravity_map)
 
     def contact(self, raw: Floats, rotation_base_7: Floats) -> Floats:
         """Return the ground's wrench on the foot in the sensor frame, shape (..., 6).
@@ -88,7 +91,7 @@ class Payload:
         return self._signs * (raw - self.bias) - self.weight(rotation_base_7)
 
     def to_base(self, wrench: Floats, rotation_base_7: Floats) -> Floats:
-        """Return the force part of `wrench` (..., 6) in the base frame, (..., 3)."""
+        """Return the force of `wrench` (..., 6) in the base frame, shape (..., 3)."""
         force_7 = wrench[..., :3].dot(self.rotation.T)
         if force_7.ndim == 1:  # live: one reading at a time
             return rotation_base_7.dot(force_7)
@@ -166,7 +169,7 @@ class LiveFoot(FootObserver):
         self._model = model
         self.payload = payload
         self._x_T, _, z_T = terrain.axes()
-        self._of_force = np.stack((-self._x_T, z_T))  # F_t and F_n
+        self._force_axes = np.stack((-self._x_T, z_T))  # F_t = -x_T.F, F_n = z_T.F
 
     def set_bias(self, bias: Sequence[float]) -> None:
         """Set the sensor's reading without load [N, N m], six numbers."""
@@ -189,7 +192,7 @@ class LiveFoot(FootObserver):
             contact = payload.contact(sample.wrench_raw, rotation)
             sample.wrench[...] = contact
             force = payload.to_base(contact, rotation)
-            sample.traction[1:] = self._of_force.dot(force)
+            sample.traction[1:] = self._force_axes.dot(force)
         velocity = twist[:3]
         sample.traction[0] = self._x_T.dot(velocity)
         return sqrt(velocity.dot(velocity))

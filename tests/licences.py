@@ -1,4 +1,4 @@
-"""The licences of everything that is installed with Traction, as a table.
+"""Table of the licences of all installed dependencies.
 
 python -m tests.licences
 """
@@ -10,12 +10,12 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 CONSTRAINTS = ROOT / "constraints.txt"
 _PIN = re.compile(r"^([A-Za-z0-9._-]+)==([^\s;]+)")
-_LONGEST = 60  # of a licence's name; beyond that a package gives its whole text
+_LONGEST = 60  # characters; a longer field holds the full licence text
 HEAD = """\
 # Licences of the dependencies
 
-What `make test` installs, in the versions of `constraints.txt`, and the licence that
-each package declares of itself.
+Packages installed by `make test`, at the versions pinned in `constraints.txt`, with the
+licence that each one declares.
 
 | package | version | licence |
 |---|---|---|"""
@@ -31,7 +31,7 @@ def licence_of(package: str) -> str:
     """Licence stated by a package's metadata, or the file that states it."""
     try:
         fields = metadata.metadata(package)
-    except metadata.PackageNotFoundError:  # of another Python
+    except metadata.PackageNotFoundError:  # pinned for another Python version
         return "not installed"
     expression = fields.get("License-Expression", "")
     classified = [

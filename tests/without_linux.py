@@ -1,4 +1,4 @@
-"""The program as on a system without the functions that Windows lacks.
+"""Run Traction without the Linux-only functions of `os`, as on Windows.
 
 python -m tests.without_linux ARGUMENTS OF TRACTION ...
 """
@@ -19,8 +19,8 @@ ABSENT = (
 
 
 def remove() -> None:
-    """Remove the functions that are absent elsewhere; call before any import."""
-    importlib.import_module("serial")  # which has a port of its own for each system
+    """Remove the Linux-only functions; call before Traction is imported."""
+    importlib.import_module("serial")  # first: it needs them to choose its backend
     for name in ABSENT:
         if hasattr(os, name):
             delattr(os, name)

@@ -168,7 +168,7 @@ class ConsoleLoop:
         self.loop_client.advance(TICK)
 
     def _update_pause(self, prompt: Prompt) -> bool:
-        """Return whether time is paused at `prompt`; a new one or a motion resumes it."""
+        """Return whether time is paused; a new prompt or a motion resumes it."""
         simulation = self.rig.simulation
         is_moving = simulation is not None and not simulation.is_hand_done
         if self._prompt is None or prompt is not self._prompt[0] or is_moving:

@@ -20,12 +20,12 @@ class Emulator:
 
     def __init__(self):
         self.read = []
-        self.link, there = socket.socketpair()
+        self.link, device_socket = socket.socketpair()
         self.link.settimeout(10.0)
-        self._device = ProxyDevice(there, self._value)
+        self._device = ProxyDevice(device_socket, self._value)
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self.error = None
-        self._there = there
+        self._device_socket = device_socket
         self._thread.start()
 
     def _serve(self):
@@ -33,7 +33,7 @@ class Emulator:
             self._device.serve()
         except ValueError as error:
             self.error = error
-        self._there.close()
+        self._device_socket.close()
 
     def _value(self, offset):
         self.read.append(offset)
@@ -43,10 +43,10 @@ class Emulator:
         data = _HEAD.pack(command, 0, len(body)) + body
         for start in range(0, len(data), piece or len(data)):
             self.link.sendall(data[start : start + (piece or len(data))])
-        answer = self.link.recv(24, socket.MSG_WAITALL)
-        head = _HEAD.unpack_from(answer)
+        reply = self.link.recv(24, socket.MSG_WAITALL)
+        head = _HEAD.unpack_from(reply)
         assert head == (1, 0, 8)
-        return int.from_bytes(answer[16:], "little")
+        return int.from_bytes(reply[16:], "little")
 
     def config(self, offset, length, value=None):
         command = _CONFIG_READ if value is None else _CONFIG_WRITE
@@ -78,20 +78,20 @@ def test_the_device_has_an_identity_and_one_page_of_registers(emulator):
 
 
 @pytest.mark.parametrize("piece", [None, 1, 7])
-def test_a_word_is_read_at_its_offset_in_any_pieces(emulator, piece):
+def test_a_read_request_may_arrive_in_pieces(emulator, piece):
     emulator.config(0x10, 4, _BASE)
     assert emulator.word(8, piece) == 2**64 - 9
     assert emulator.read == [8]
 
 
-def test_descriptors_of_memory_are_closed_without_an_answer(emulator):
-    mine, theirs = os.pipe()
+def test_guest_memory_descriptors_are_closed_without_a_reply(emulator):
+    read_end, write_end = os.pipe()
     data = _HEAD.pack(_MEMORY, 0, 192) + bytes(192)
-    socket.send_fds(emulator.link, [data], [theirs])
-    assert emulator.ask(_RESET) == 0  # the next answer is the next message's
-    os.close(theirs)
-    assert os.read(mine, 1) == b""  # the other end is closed
-    os.close(mine)
+    socket.send_fds(emulator.link, [data], [write_end])
+    assert emulator.ask(_RESET) == 0  # the memory message had no reply
+    os.close(write_end)
+    assert os.read(read_end, 1) == b""  # the device closed its copy
+    os.close(read_end)
 
 
 def test_a_message_of_another_protocol_closes_the_connection():

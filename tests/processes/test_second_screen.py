@@ -64,12 +64,12 @@ def test_a_client_that_stops_reading_does_not_affect_the_others(session):
         with Viewer(port) as stalled, Viewer(port) as reading:
             for viewer in (stalled, reading):
                 written(shared, 0)
-                viewer.look(lambda v: v.channels)
+                viewer.receive_until(lambda v: v.channels)
             end_ns, sent, before = CLOCK.now_ns() + int(STALLED * 1e9), 0, 0
             while CLOCK.now_ns() < end_ns:
                 sent += 1
                 number = written(shared, sent)["host_ns"][0]
-                reading.look(lambda v, number=number: _newest(v) == number)
+                reading.receive_until(lambda v, number=number: _newest(v) == number)
                 before = memory_kb(server.pid) if sent == 100 else before
             assert sent > 10 * STALLED
             assert memory_kb(server.pid) - before < 4000
@@ -88,9 +88,9 @@ def test_a_killed_server_leaves_the_memory_unchanged(session):
     server, port = watching(data)
     record = written(shared, 1)
     with Viewer(port) as viewer:
-        viewer.look(lambda v: v.channels)
+        viewer.receive_until(lambda v: v.channels)
         written(shared, 2)
-        viewer.look(lambda v: v.messages.get("/cycle"))
+        viewer.receive_until(lambda v: v.messages.get("/cycle"))
         before = bytes(shared.memory.view)
         os.kill(server.pid, signal.SIGKILL)
         assert until(lambda: server.poll() is not None, LONGEST) is not None

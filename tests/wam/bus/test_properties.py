@@ -14,7 +14,7 @@ from wam.bus.properties import (
     property_number,
 )
 
-# Numbers that are in the frames of a current arm.
+# Property numbers in the CAN frames of a current arm.
 CURRENT = {
     **{"T": 42, "MT": 43, "P": 48, "MECH": 66, "CTS": 68, "PIDX": 70, "IPNM": 86},
     **{"POLES": 90, "EN": 94, "JP": 96, "ECMAX": 101, "ECMIN": 102, "IHIT": 108},
@@ -92,8 +92,8 @@ def test_old_safety_firmware_shares_the_motor_table():
     ],
 )
 def test_property_numbers_of_the_safety_module_depend_on_the_firmware(vers, expected):
-    asked = ("ZERO", "PEN", "VL2", "TL2", "IFAULT", "LOAD", "DEF")
-    assert tuple(property_number(Device.SAFETY, n, vers) for n in asked) == expected
+    requested = ("ZERO", "PEN", "VL2", "TL2", "IFAULT", "LOAD", "DEF")
+    assert tuple(property_number(Device.SAFETY, n, vers) for n in requested) == expected
 
 
 @pytest.mark.parametrize(
@@ -103,8 +103,9 @@ def test_an_unknown_firmware_maps_to_the_nearest_documented_one(vers, nearest):
     assert nearest_documented(vers) == nearest
 
 
-def test_sensor_has_one_table_for_every_version():
-    table = numbers(Device.SENSOR, 0)
+@pytest.mark.parametrize("vers", [0, 61, 200])
+def test_sensor_has_one_table_for_every_version(vers):
+    table = numbers(Device.SENSOR, vers)
     assert [table[n] for n in ("SG1", "FX", "TZ", "FT", "GM", "T3", "A")] == [
         *(42, 48, 53, 54, 58, 63, 64)
     ]
@@ -121,9 +122,9 @@ def test_one_property_number_has_a_different_meaning_on_each_device():
 
 @pytest.mark.parametrize("vers", [61, 65, 125, 132, 175, 200])
 def test_a_property_number_has_one_meaning_except_for_the_alias(vers):
-    found = sorted(numbers(Device.MOTOR, vers).values())
-    doubles = [n for n, m in pairwise(found) if n == m]
-    assert doubles == [17]  # FET1 is also called TENSION
+    ordered = sorted(numbers(Device.MOTOR, vers).values())
+    duplicates = [n for n, m in pairwise(ordered) if n == m]
+    assert duplicates == [17]  # FET1 is also called TENSION
 
 
 def test_32_bit_properties_are_followed_by_a_free_number():
