@@ -31,9 +31,10 @@ def demo_rows(fits: dict[str, Any]) -> list[str]:
     return [
         "| mean absolute error, plate with tread (TF): Tustin, GP, a constant "
         f"| {_errors(plate)} | `make demo`, Summary of the report |",
-        f"| the same, small stones (S0) | {_errors(stones)} | same |",
-        f"| measured against true over the {len(errors['rows'])} trials, median: v_t, "
-        f"F_t, F_n | {v_t:.1f} mm/s, {F_t:.2f} N, {F_n:.2f} N | same, table "
+        f"| mean absolute error, small stones (S0) | {_errors(stones)} | same |",
+        f"| error of the simulated measurement over the {len(errors['rows'])} trials, "
+        f"median: v_t, F_t, F_n | {v_t:.1f} mm/s, {F_t:.2f} N, {F_n:.2f} N "
+        "| same, table "
         '"Measured against true" |',
     ]
 

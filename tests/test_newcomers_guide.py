@@ -1,4 +1,4 @@
-"""The newcomer's guide is followed in a copy of the tree, change by change."""
+"""The changes of the newcomer's guide are applied to a copy of the tree and tried."""
 
 import os
 import re
@@ -20,7 +20,7 @@ PACKAGES = (
     "traction",
     "wam",
 )
-TRIED_BY = {  # output of a recipe that works
+EXPECTED_OUTPUT = {
     "A terrain": r"M5 +simulated +1/1",
     "A sensor": r"Complete\.",
     "A kernel or model": r"index\.html",
@@ -37,13 +37,13 @@ TRIED = re.compile(r"^Try it:" + BLOCK, re.MULTILINE | re.DOTALL)
 
 
 def recipe(title):
-    """Part of the guide under a heading."""
+    """Return the part of the guide under a heading."""
     return re.split(r"^## ", GUIDE.partition(f"## {title}\n")[2], flags=re.M)[0]
 
 
 @pytest.fixture
 def tree(tmp_path):
-    """A copy of the program's tree, as a newcomer has it."""
+    """A copy of the program's tree."""
     for package in PACKAGES:
         ignored = shutil.ignore_patterns("__pycache__")
         shutil.copytree(ROOT / package, tmp_path / package, ignore=ignored)
@@ -52,8 +52,8 @@ def tree(tmp_path):
     return tmp_path
 
 
-def make(tree, title):
-    """Make every change of a recipe; the files changed."""
+def apply_changes(tree, title):
+    """Apply every change of a recipe; return the changed files."""
     files = []
     for change in CHANGE.finditer(recipe(title)):
         path, text = tree / change["file"], change["text"]
@@ -70,8 +70,8 @@ def make(tree, title):
     return files
 
 
-def tried(tree, title):
-    """Run the commands of a recipe; their output."""
+def run_commands(tree, title):
+    """Run the commands of a recipe; return their output."""
     outputs = []
     scripts = tree / "bin"
     scripts.mkdir()
@@ -97,19 +97,19 @@ def tried(tree, title):
     return "\n".join(outputs)
 
 
-def counted(title):
-    """Number of files that the guide's table states for a recipe."""
+def stated_file_count(title):
+    """Return the number of files that the guide's table states for a recipe."""
     row = re.search(rf"^\| {title.lower()} \| (.*) \|$", GUIDE, re.MULTILINE)
     return sum(map(int, re.findall(r"\d+", row[1])))
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)  # each copies the program and runs it
-@pytest.mark.parametrize(("title", "word"), TRIED_BY.items())
+@pytest.mark.parametrize(("title", "word"), EXPECTED_OUTPUT.items())
 def test_a_recipe_of_the_guide_works_with_the_stated_number_of_files(tree, title, word):
-    files = make(tree, title)
-    assert len(set(files)) == counted(title)
-    assert re.search(word, tried(tree, title))
+    files = apply_changes(tree, title)
+    assert len(set(files)) == stated_file_count(title)
+    assert re.search(word, run_commands(tree, title))
     if title == "A kernel or model":
         assert "GP (SE + NN)" in (tree / "fit/report/index.html").read_text()
     if title == "A sensor":
@@ -119,4 +119,4 @@ def test_a_recipe_of_the_guide_works_with_the_stated_number_of_files(tree, title
 
 def test_every_recipe_of_the_guide_is_tested():
     titles = re.findall(r"^## (.*)$", GUIDE, re.MULTILINE)
-    assert [*TRIED_BY, "Before it is done"] == titles
+    assert [*EXPECTED_OUTPUT, "Before you commit"] == titles

@@ -120,7 +120,7 @@ KEYS: Mapping[Prompt, tuple[OperatorKey, ...]] = {
             "last",
         ),
         _UNDO,
-        OperatorKey("1", KeyAction.TICK, "to `9` tick a step of the reset"),
+        OperatorKey("1", KeyAction.TICK, "to `9` tick off a reset step"),
         *(OperatorKey(str(n), KeyAction.TICK) for n in range(2, MAX_STEPS + 1)),
     ),
     Prompt.PAUSED: (_CONFIRM, _QUIT),
@@ -161,7 +161,7 @@ STOP_KEYS = "Ctrl-C finish safely, twice = stop now"
 # Prompts whose keys docs/sessions.md explains, with their descriptions there.
 _EXPLAINED = {
     Prompt.SUPPORT: "the arm is to be activated",
-    Prompt.DAMPED: "the arm was too fast, and is damped",
+    Prompt.DAMPED: "the arm is damped after overspeed",
     Prompt.MOVE: "the arm is to move by itself",
     Prompt.LAY_DOWN: "the arm is to go idle",
     Prompt.READY: "between two trials",
