@@ -282,7 +282,7 @@ def _say(scene: Scene, judgement: Judgement) -> None:
         scene.console.check(GOOD, "daily check", "the arm is as it was commissioned")
 
 
-_SHOWN = ("from a question", "seven positions", "zero", "weight", "lift-off")
+_SHOWN = ("response time", "time until seven", "zero", "weight", "lift-off")
 
 
 def _now(scene: Scene) -> datetime:

@@ -150,14 +150,14 @@ class Review:
     def _lag_line(self) -> tuple[str, str]:
         """Return (mark, text) on the lag of the forces."""
         if self.lag is None:
-            return WARNING, "lag of the force not vouched for: no motion shows it"
+            return WARNING, "lag of the force unknown: the motion does not show it"
         late = self.lag.seconds * 1e3
         words = f"lag force {abs(late):.1f} ms {'late' if late >= 0 else 'early'}"
         return WARNING if self._doubt("lag") else GOOD, words
 
     def _sensor_words(self) -> str:
         if frozen := self._doubt("frozen"):
-            return f"sensor not vouched for: {frozen.seen}"
+            return f"sensor unreliable: {frozen.seen}"
         if self.saturated:
             return f"sensor saturated in {self.saturated:.1%} of the cycles"
         if self.stale > STALE_SHARE:
@@ -172,7 +172,7 @@ class Review:
         if not _is_friction(self.ratio):
             return BAD, f"{words} cannot be: above 0 and at most {FRICTION[1]:g} can"
         if self.doubts:
-            return WARNING, f"{words}, not vouched for"
+            return WARNING, f"{words}, unreliable"
         valid = [ratio for ratio in earlier if _is_friction(ratio)]
         if len(valid) < MIN_EARLIER:
             return GOOD, words

@@ -263,10 +263,10 @@ ROWS: dict[str, dict[str, Fields]] = {
         "stuck": (
             "an old force is recorded as new",
             "firmware hangs and repeats its sample",
-            "samples that do not change are not vouched for, 70 ms; of a Bota and an ATI nor is one of six numbers that repeats, 0.25 to 0.5 s; the review names the channel of any sensor",
+            "unchanging samples are marked invalid after 70 ms, one constant channel of a Bota or ATI after 0.25 to 0.5 s; the review reports the channel of any sensor",
             "as lost",
             ("ft-frozen", "ft-stuck"),
-            "a channel of a coarser sensor is told after the trial only",
+            "a channel of a coarser sensor is reported after the trial only",
             (
                 _MATRIX,
                 "tests/ft_sensor/vendors/test_sensor_contract.py::test_one_frozen_reading_is_invalid_until_it_changes",
@@ -690,7 +690,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "as a stuck wrench",
             "adapter repeats its buffer",
             "device counter and value do not change",
-            "samples are not vouched for",
+            "samples are marked invalid",
             ("ft-frozen",),
             "",
             (_MATRIX,),

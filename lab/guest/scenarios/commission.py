@@ -44,7 +44,7 @@ def at_rest(room: MachineRoom) -> Figures:
     room.finish(day.program, _STEP)
     record = _sound_record(room, GATED)
     return {
-        "silence": _quantity(record, StepId.REST_POSE, "a module that brakes"),
+        "silence": _quantity(record, StepId.REST_POSE, "until the module idles"),
         "sole": _sole_travel(room, record),
     }
 

@@ -94,7 +94,7 @@ def test_many_sound_arms_pass_on_another_day(tool):
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        ("foot-heavier", "weight of the foot beside"),
+        ("foot-heavier", "weight of the foot compared"),
         ("sensor-turned-20deg", "weight of the foot"),
         ("sensor-cable-pulls", "weight of the foot"),
         ("zero-2-off-10deg", "weight of the foot"),
@@ -125,10 +125,10 @@ def test_a_joint_that_is_lifted_by_less_than_its_weight_is_named(tool):
     [
         ({"heard_master": np.array(20)}, "other masters"),
         ({"changed": texts(["a puck"])}, "Changed since the commissioning: a puck"),
-        ({"late": np.array(4)}, "answered all the same"),
+        ({"late": np.array(4)}, "with a reply"),
         ({"replies_ns": np.full(100, 1_600_000)}, "seven positions"),
         ({"replies_ns": np.zeros(0)}, "seven positions"),
-        ({"answer_ns": np.array(2_300_000)}, "from a question"),
+        ({"answer_ns": np.array(2_300_000)}, "response time"),
         ({"zero": np.radians([0.0, 1.8, 0, 0, 0, 0, 0])}, "zeroed elsewhere"),
     ],
 )
@@ -140,7 +140,7 @@ def test_an_arm_that_moves_without_torque_is_named_and_not_lifted(tool):
     values = {k: v for k, v in day(tool, 1).items() if not k.startswith("ramp_")}
     values["rest_q"] = values["rest_q"].copy()
     values["rest_q"][-1, 1] += 0.016
-    assert daily.judge(values).cause.startswith("way of joint 2 without torque")
+    assert daily.judge(values).cause.startswith("travel of joint 2 without torque")
 
 
 def test_a_daily_check_before_the_commissioning_is_refused(tmp_path):

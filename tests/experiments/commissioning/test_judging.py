@@ -73,7 +73,7 @@ def test_a_wrong_encoder_is_named(values, words):
 def test_a_joint_that_moves_along_is_named():
     values = turned()
     values["high"][4, 5] = 1.0
-    assert "Turned was joint 5, joint 6 went along" in manual_joints.judge(values).cause
+    assert "Joint 5 was turned, joint 6 moved" in manual_joints.judge(values).cause
 
 
 def pressed(*, silent_after=0):
@@ -140,7 +140,7 @@ def test_an_arm_that_moves_without_torque_is_named():
     values = {"t_ns": np.arange(500) * 2_000_000, "q": q, "ended": texts([])}
     assert rest_pose.judge_rest(values).cause == ""
     q[-1, 2] += 0.016
-    assert "way of joint 3" in rest_pose.judge_rest(values).cause
+    assert "travel of joint 3" in rest_pose.judge_rest(values).cause
 
 
 @pytest.mark.parametrize(
@@ -163,7 +163,7 @@ def test_a_module_must_brake_an_arm_without_requests_in_time(braked_ms, is_sound
     }
     cause = rest_pose.judge_rest(values).cause
     assert (cause == "") is is_sound
-    assert is_sound or "a module that brakes" in cause
+    assert is_sound or "until the module idles" in cause
 
 
 @pytest.mark.parametrize(

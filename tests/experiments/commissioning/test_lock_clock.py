@@ -87,7 +87,7 @@ def test_a_lock_of_another_stiffness_is_named(stiffness):
 
 
 def test_a_lock_that_rings_is_named():
-    assert cause(**turned(back=0.6)).startswith("swing beyond its rest")
+    assert cause(**turned(back=0.6)).startswith("overshoot after the release")
     assert cause(**turned(back=0.3)) == ""
 
 

@@ -1,4 +1,4 @@
-"""C5 to C7 on arms that are held still: sound ones pass, wrong ones are named."""
+"""C5 to C7 on arms that are held still: sound ones pass, faulty ones fail."""
 
 import pytest
 
@@ -8,18 +8,21 @@ from experiments.settings.load import load_settings
 from tests.experiments.commissioning.held_arm import HeldArm
 
 SOUND = 40
-WRONG = {  # wrong rig: possible words of the first cause
+WRONG = {  # faulty rig: possible texts of the first cause
     "zero-2-off-10deg": ("joint 2 on its stop",),
     "wrist-9.48": ("travel of joint",),
     "encoder-4-reversed": ("sense of joint 4",),
-    "base-on-ceiling": ("The base stands otherwise",),
+    "base-on-ceiling": ("The base is mounted differently",),
     "foot-heavier": ("mass of the foot",),
     "centre-off-50mm": ("centre of the foot",),
     "sole-20mm-lower": ("sole of rig.toml",),
     "sensor-turned-20deg": ("The sensor is turned", "it is turned", "the sensor about"),
     "sensor-sign": ("the sensor's sign",),
     "sensor-kgf": ("Units of the sensor",),
-    "sensor-foreign-matrix": ("matrix is another one's", "The sensor is turned"),
+    "sensor-foreign-matrix": (
+        "matrix belongs to another sensor",
+        "The sensor is turned",
+    ),
     "sensor-cable-pulls": ("its cable pulls",),
 }
 
@@ -52,7 +55,7 @@ def test_many_sound_arms_pass(tool):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("wrong", WRONG)
-def test_a_wrong_arm_is_named(tool, wrong):
+def test_the_cause_of_a_faulty_arm_is_reported(tool, wrong):
     for seed in (1, 2, 3):
         cause = next(filter(None, causes(tool, seed, wrong)))
         assert any(words in cause for words in WRONG[wrong])

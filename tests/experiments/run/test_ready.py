@@ -90,7 +90,7 @@ def test_the_last_review_is_shown_again(scripted):
     assert first[1] == first[2]
     last = len(lines) - 1 - lines[::-1].index(first[2])
     assert lines[last + 1].startswith(" ✔ timing worst gap")
-    assert lines[last + 6].startswith(" ▲ lag of the force not vouched for")  # a plate
+    assert lines[last + 6].startswith(" ▲ lag of the force unknown")  # a plate
 
 
 RESET = "Reset (its digit ticks a step):  1 ☐ wipe  2 ☐ foot at the far end"
