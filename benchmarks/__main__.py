@@ -1,4 +1,4 @@
-"""Run all benchmarks and print one table: measurement, today's value, goal, verdict.
+"""Run all benchmarks and print one table: measurement, value, goal, verdict.
 
     python -m benchmarks [--only NAME ...]
 
@@ -57,7 +57,7 @@ def run_one(name: str) -> list[BenchRow]:
 
 def table_of(rows_by_name: dict[str, list[BenchRow]]) -> str:
     """Return the results as a Markdown table."""
-    lines = ["| what | today | goal | | `python -m benchmarks --only` |"]
+    lines = ["| what | measured | goal | | `python -m benchmarks --only` |"]
     lines.append("|---|---|---|---|---|")
     lines += [
         f"| {' | '.join(row.cells())} | {name} |"

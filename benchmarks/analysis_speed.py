@@ -23,7 +23,7 @@ from analysis.report.reduced_trial import ReducedTrial
 from analysis.study.crossval import run_fold
 from analysis.study.models import REPORTED
 from analysis.terrains.table import Table
-from benchmarks.fit import EVALUATION, chosen, load_rows, our_evaluation
+from benchmarks.fit import EVALUATION, chosen, evaluation_function, load_rows
 from benchmarks.rows import BenchRow
 from benchmarks.study_race import SLICE, folds_of
 from experiments.__main__ import main as traction
@@ -84,7 +84,7 @@ def worker_rows() -> list[BenchRow]:
     task = folds_of(SLICE)[0]
     task = replace(task, options=replace(task.options, models=REPORTED))
     what = f"a fold of the report's {len(REPORTED)} models"
-    evaluate = our_evaluation(*chosen(load_rows()))
+    evaluate = evaluation_function(*chosen(load_rows()))
     with threadpool_limits(1):
         fold_s, evaluation_s = best(lambda: run_fold(task), 2), best(evaluate, 5, 20)
     return [

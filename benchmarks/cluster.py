@@ -64,7 +64,7 @@ def gain(
 ) -> float:
     """Return the speed-up of two workers over one, median of the rounds."""
     for workers in (one, two):
-        wall_time(folds[:4], workers)  # lets the workers import their modules
+        wall_time(folds[:4], workers)  # warm-up: the workers import their modules
     return statistics.median(
         wall_time(folds, one) / wall_time(folds, two) for _ in range(rounds)
     )

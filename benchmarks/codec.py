@@ -46,12 +46,12 @@ _FT = property_number(Device.SENSOR, "FT")
 
 
 @dataclass(frozen=True, slots=True)
-class PageSection:
+class PartCost:
     """Measured cost of one part of a cycle.
 
     Attributes:
         name: name of the part.
-        frames: number of frames it handles per cycle.
+        frames: number of frames handled per cycle.
         median_us: cost per cycle, median over rounds [us].
         p99_us: 99th percentile over rounds [us].
         per_codec: median as a multiple of the whole codec's.
@@ -158,7 +158,7 @@ def library_work(bus: can.BusABC, other: can.BusABC) -> list[_Work]:
     ]
 
 
-def measure(work: list[_Work], rounds: int) -> list[PageSection]:
+def measure(work: list[_Work], rounds: int) -> list[PartCost]:
     """Run all parts `rounds` times in turn and return the cost of each per cycle."""
     durations: list[list[int]] = [[] for _ in work]
     gc.collect()
@@ -181,10 +181,10 @@ def measure(work: list[_Work], rounds: int) -> list[PageSection]:
     return [_part("codec, whole cycle", 13, whole, unit), *parts]
 
 
-def _part(name: str, frames: int, times: list[int], unit: float) -> PageSection:
+def _part(name: str, frames: int, times: list[int], unit: float) -> PartCost:
     median = statistics.median(times)
     p99 = sorted(times)[math.ceil(0.99 * len(times)) - 1]
-    return PageSection(name, frames, median / 1e3, p99 / 1e3, median / unit)
+    return PartCost(name, frames, median / 1e3, p99 / 1e3, median / unit)
 
 
 def _messages(frames: list[tuple[int, bytes]]) -> list[can.Message]:
@@ -204,7 +204,7 @@ def _two_ends() -> Generator[tuple[can.BusABC, can.BusABC]]:
         yield one, other
 
 
-def _summary(parts: list[PageSection], rounds: int) -> dict[str, object]:
+def _summary(parts: list[PartCost], rounds: int) -> dict[str, object]:
     return {
         "rounds": rounds,
         "goal_us": GOAL_US,
@@ -213,7 +213,7 @@ def _summary(parts: list[PageSection], rounds: int) -> dict[str, object]:
     }
 
 
-def _print_table(parts: list[PageSection], rounds: int) -> None:
+def _print_table(parts: list[PartCost], rounds: int) -> None:
     print(f"{'part':26}{'frames':>7}{'p50 us':>10}{'p99 us':>10}{'x codec':>10}")
     for part in parts:
         print(

@@ -27,7 +27,7 @@ from analysis.gp.regression import fit_gp
 from analysis.tables.loading import load_tables
 from analysis.tustin.model import TustinBounds, TustinParameters, fit_tustin, predict
 from benchmarks import peer_gpy, peer_tinygp
-from benchmarks.peer_sklearn import KERNELS, fit_sklearn, theirs, three_starts
+from benchmarks.peer_sklearn import KERNELS, fit_sklearn, sklearn_kernel, three_starts
 from benchmarks.rows import BenchRow, not_installed
 from benchmarks.study_race import SLICE, race
 
@@ -120,7 +120,7 @@ def parts(rounds: int) -> list[SpeedComparison]:
     X, y = chosen(rows)
     starts = {part: three_starts(part, X, y) for part in KERNELS}
 
-    def likelihood_of_theirs(part: str) -> float:
+    def sklearn_likelihood(part: str) -> float:
         model = fit_sklearn(part, X, y, starts[part])
         return float(model.log_marginal_likelihood_value_)
 
@@ -129,13 +129,13 @@ def parts(rounds: int) -> list[SpeedComparison]:
         SpeedComparison(
             "SE fit",
             lambda: fit_gp(X, y).lml,
-            lambda: likelihood_of_theirs("SE fit"),
+            lambda: sklearn_likelihood("SE fit"),
             rounds,
         ),
         SpeedComparison(
             "NN fit",
             lambda: fit_gp(X, y, Arcsine()).lml,
-            lambda: likelihood_of_theirs("NN fit"),
+            lambda: sklearn_likelihood("NN fit"),
             rounds,
         ),
         SpeedComparison(
@@ -147,7 +147,7 @@ def parts(rounds: int) -> list[SpeedComparison]:
     ]
 
 
-def our_evaluation(X: np.ndarray, y: np.ndarray) -> Callable[[], float]:
+def evaluation_function(X: np.ndarray, y: np.ndarray) -> Callable[[], float]:
     """Return a function that evaluates one likelihood with its gradient."""
     theta = three_starts("SE fit", X, y)[0]
     likelihood = Likelihood(KERNELS["SE fit"], ConstantNoise(), X, y)
@@ -158,12 +158,12 @@ def evaluation(X: np.ndarray, y: np.ndarray, rounds: int) -> SpeedComparison:
     """Compare one likelihood evaluation with its gradient against scikit-learn's."""
     theta = three_starts("SE fit", X, y)[0]
     model = GaussianProcessRegressor(
-        theirs("SE fit", theta, float(y.std())), alpha=1e-10, optimizer=None
+        sklearn_kernel("SE fit", theta, float(y.std())), alpha=1e-10, optimizer=None
     ).fit(X, y)
     fitted = model.kernel_.theta
     return SpeedComparison(
         "evaluation",
-        our_evaluation(X, y),
+        evaluation_function(X, y),
         lambda: model.log_marginal_likelihood(
             fitted, eval_gradient=True, clone_kernel=False
         )[0],

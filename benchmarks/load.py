@@ -131,7 +131,7 @@ def iterating(path: Path) -> Positions:
 
 
 def iterating_unsorted(path: Path) -> Positions:
-    """Read like `iterating`, in file order, which spares mcap's reader its heap."""
+    """Read like `iterating` in file order, without the heap of mcap's reader."""
     return _joined(path, in_order=False)
 
 
@@ -180,7 +180,7 @@ def readers() -> dict[str, Callable[[Path], Positions]]:
     functions = {
         "this reader": this_reader,
         "mcap iter_messages + frombuffer": iterating,
-        "the same without sorting": iterating_unsorted,
+        "mcap iter_messages without sorting": iterating_unsorted,
         "rosbags, decoded": decoding_with_rosbags,
     }
     try:

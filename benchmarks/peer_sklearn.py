@@ -72,8 +72,8 @@ class NeuralNetwork(Kernel):
         return False
 
 
-def theirs(part: str, start: np.ndarray, sd: float) -> Kernel:
-    """Return scikit-learn's kernel at one of our starts, with our bounds."""
+def sklearn_kernel(part: str, start: np.ndarray, sd: float) -> Kernel:
+    """Return scikit-learn's kernel at a start and with the bounds of this project."""
     sf, *lengths, sn = np.exp(start)
     shape: Kernel = (
         RBF(lengths, (np.exp(-4), np.exp(6)))
@@ -86,7 +86,7 @@ def theirs(part: str, start: np.ndarray, sd: float) -> Kernel:
 
 
 def three_starts(part: str, X: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return three initial thetas: the start of our search, then its design points."""
+    """Return three initial thetas: start and design points of this project's search."""
     kernel, noise = KERNELS[part], ConstantNoise()
     starts = posterior_search(kernel, noise, X, y).start_points
     sd = float(y.std())
@@ -100,14 +100,16 @@ def three_starts(part: str, X: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, .
 def fit_sklearn(
     part: str, X: np.ndarray, y: np.ndarray, starts: Sequence[np.ndarray]
 ) -> GaussianProcessRegressor:
-    """Fit scikit-learn's model from each start and return the likeliest.
+    """Fit scikit-learn's model from each start and return the most likely one.
 
-    The starts are given, so the time for choosing them counts only for our search.
+    The starts are given: the time to choose them counts only for this project.
     """
     models, sd = [], float(y.std())
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # length scales may end at their bounds
         for start in starts:
-            model = GaussianProcessRegressor(theirs(part, start, sd), alpha=1e-10)
+            model = GaussianProcessRegressor(
+                sklearn_kernel(part, start, sd), alpha=1e-10
+            )
             models.append(model.fit(X, y))
     return max(models, key=lambda model: model.log_marginal_likelihood_value_)

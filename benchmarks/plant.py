@@ -35,7 +35,7 @@ from wam.model.tool import Tool, box_inertia, sensor_body
 GOAL_US = 160.0  # per cycle of four substeps
 SUBSTEPS = 4
 _EFFECTIVE_MASS = 0.30  # kg
-_SETTLING = 1000  # cycles for putting the foot down
+_SETTLING = 1000  # cycles to put the foot down
 _SEED, _TERRAIN, _TRIAL = 1, "S0", 1
 _FRAME = TerrainFrame(0.0, 0.0, (0.70, 0.0, 0.12), 0.45)
 _START = np.array([0.0, 0.7696, 0.0, 1.1857, 0.0, 1.1863, 0.0])
@@ -44,8 +44,8 @@ _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
 @dataclass(frozen=True, slots=True)
-class PageSection:
-    """Measured cost of one part of a cycle [us]; `share` is of the whole's median."""
+class PartCost:
+    """Measured cost of one part of a cycle [us]; `share` of the median of the whole."""
 
     name: str
     median_us: float
@@ -96,7 +96,7 @@ def main() -> int:
     return 0
 
 
-def measure(cycles: int) -> list[PageSection]:
+def measure(cycles: int) -> list[PartCost]:
     """Simulate `cycles` of a push and return the cost of the whole and of each part."""
     notes = Notes()
     for _ in _run(cycles, notes):
@@ -252,13 +252,13 @@ def _ground() -> Terrain:
     )
 
 
-def _part(name: str, times: list[float], whole: float) -> PageSection:
+def _part(name: str, times: list[float], whole: float) -> PartCost:
     median = statistics.median(times)
     p99 = sorted(times)[math.ceil(0.99 * len(times)) - 1]
-    return PageSection(name, median, p99, median / whole)
+    return PartCost(name, median, p99, median / whole)
 
 
-def _print_table(parts: list[PageSection], cycles: int) -> None:
+def _print_table(parts: list[PartCost], cycles: int) -> None:
     print(f"{'part':17}{'p50 us':>10}{'p99 us':>10}{'share':>8}")
     for part in parts:
         print(

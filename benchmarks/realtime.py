@@ -47,7 +47,7 @@ def compiled(folder: Path) -> tuple[Path, Path]:
     return built[0], built[1]
 
 
-def in_c(program: Path, core: int, seconds: float, bus: str = "") -> Window:
+def run_in_c(program: Path, core: int, seconds: float, bus: str = "") -> Window:
     """Run the C loop; with `bus`, the socket of a simulated arm, with the exchange."""
     command = [str(program), str(core), str(seconds)] + ([bus] if bus else [])
     done = subprocess.run(command, capture_output=True, check=True, text=True)
@@ -101,8 +101,8 @@ def measure(
     record.loops.append(Window(np.concatenate(windows)))
     backend.loop_client.idle()
     backend.end_loop()
-    record.wakes.append(in_c(program, core, seconds / 2))
-    record.exchanges.append(in_c(program, core, seconds, backend.bus_path))
+    record.wakes.append(run_in_c(program, core, seconds / 2))
+    record.exchanges.append(run_in_c(program, core, seconds, backend.bus_path))
 
 
 def columns(timings: Record) -> Times:

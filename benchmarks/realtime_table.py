@@ -44,7 +44,7 @@ def missed(cycles: Times) -> Times:
     return np.repeat(cycles[:, 1], np.maximum(gaps, 0) + late)
 
 
-def explained(moments: Times, stalls: Times) -> NDArray[np.bool_]:
+def are_near_a_stall(moments: Times, stalls: Times) -> NDArray[np.bool_]:
     """Return which of `moments` lie within 4 ms of a stall."""
     if not len(stalls):
         return np.zeros(len(moments), bool)
@@ -98,7 +98,7 @@ def cycle_rows(record: RealtimeRecord, stalls: Times) -> list[Row]:
     """Return the rows on the timing within a cycle."""
     cycles = record.cycles()
     whole = (cycles[:, 2] > cycles[:, 1]) & (cycles[:, 3] >= cycles[:, 2])
-    clean = cycles[whole & ~explained(cycles[:, 1], stalls)]
+    clean = cycles[whole & ~are_near_a_stall(cycles[:, 1], stalls)]
     compute, out = clean[:, 3] - clean[:, 2], clean[:, 3] - clean[:, 0]
     c_50, c_999 = np.percentile(compute, (50, 99.9)) / 1000
     o_50, o_999 = np.percentile(out, (50, 99.9)) / 1000
@@ -163,12 +163,12 @@ def miss_rows(record: RealtimeRecord, stalls: Times) -> list[Row]:
     in_loop = np.concatenate([missed(window.cycles) for window in record.loops])
     in_c = np.concatenate([missed(window.cycles) for window in record.exchanges])
     in_c_count = sum(len(window.cycles) for window in record.exchanges)
-    unexplained = int((~explained(in_loop, stalls)).sum())
+    unexplained = int((~are_near_a_stall(in_loop, stalls)).sum())
     per_million = unexplained / count * 1e6
     allowed = 1.5 * len(in_c) * count / in_c_count + 5
     return [
         Row(
-            "missed, not explained",
+            "missed, not are_near_a_stall",
             "<= 100 per million",
             f"{unexplained} of {count} ({per_million:.0f} per million)",
             per_million <= 100,

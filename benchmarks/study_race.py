@@ -1,10 +1,10 @@
 """A study's folds raced against scikit-learn: four Gaussian processes, predictions.
 
-Both get the same selected rows and the same Tustin curve; scikit-learn also gets the
-starts, while choosing them counts for ours. Both predict the same rows: means for the
-training rows and the trials of all other terrains, mean and standard deviation for the
-held-out trial. The two take turns, fold by fold. Processor time of one thread each is
-measured, so that other programs do not count.
+Both get the same selected rows and the same Tustin curve; scikit-learn is given the
+starts, while choosing them counts for this project. Both predict the same rows: means
+for the training rows and the trials of all other terrains, mean and standard deviation
+for the held-out trial. They take turns, fold by fold. The processor time of one thread
+each is measured, so that other programs do not count.
 """
 
 import statistics
@@ -34,7 +34,7 @@ from benchmarks.peer_sklearn import fit_sklearn, three_starts
 
 SLICE = Path(__file__).parents[1] / "tests" / "data" / "rehearsal_slice.npz"
 _GOAL = 4.0
-# model -> its part in `benchmarks.peer_sklearn`, whether its mean is a Tustin curve
+# model: (part in `benchmarks.peer_sklearn`, whether the mean is a Tustin curve)
 FITS = {
     GP_SE: ("SE fit", False),
     GP_NN: ("NN fit", False),
@@ -51,7 +51,7 @@ class FoldRows(NamedTuple):
         centre: means of the selected rows' inputs, shape (2,).
         scale: their standard deviations, shape (2,).
         X: standardised inputs of the selected rows, shape (n, 2).
-        outputs: F_t [N] of the selected rows minus its mean or the curve, shape (n,),
+        outputs: F_t [N] of the selected rows minus their mean or the curve, shape (n,),
             by name of the model.
     """
 
@@ -70,13 +70,13 @@ class FoldTimes(NamedTuple):
     """Times and likelihoods of one fold.
 
     Attributes:
-        mine: our processor time [s].
-        its: scikit-learn's processor time [s].
-        reached: (our, scikit-learn's) log likelihood of each fit.
+        own_s: processor time of this project [s].
+        sklearn_s: scikit-learn's processor time [s].
+        reached: log likelihoods of each fit, (this project's, scikit-learn's).
     """
 
-    mine: float
-    its: float
+    own_s: float
+    sklearn_s: float
     reached: list[tuple[float, float]]
 
 
@@ -88,7 +88,7 @@ def race(
     Args:
         path: npz file of trials.
         share: share of the folds that both run, drawn with a fixed seed; the other
-            folds are run by ours alone.
+            folds are run by this project alone.
         rounds: repeats of every fold; medians count.
         is_whole: run every fold; else only the first of every terrain.
     """
@@ -102,7 +102,7 @@ def race(
     others = [task for k, task in enumerate(tasks) if k not in drawn]
     alone, _ = timed(lambda: [run_fold(task) for task in others])
     return report(laps, alone, len(tasks)) | {
-        "notes": [*compared(laps), *where_time_goes(tasks[0])]
+        "notes": [*likelihood_comparison(laps), *time_breakdown(tasks[0])]
     }
 
 
@@ -137,54 +137,57 @@ def fold_rows(task: FoldTask) -> FoldRows:
 
 def lap(task: FoldTask, rounds: int) -> FoldTimes:
     """Run one fold on both sides in turn; return times and likelihoods."""
-    mine, its, models, likelihoods = [], [], {}, {}
+    own_s, sklearn_s, models, likelihoods = [], [], {}, {}
     starts = starts_of(task)
     for _ in range(rounds):
         seconds, models = timed(lambda: run_fold(task).models)
-        mine.append(seconds)
+        own_s.append(seconds)
         seconds, likelihoods = timed(lambda: run_sklearn(task, starts))
-        its.append(seconds)
+        sklearn_s.append(seconds)
     reached = [(models[name].model.process.lml, likelihoods[name]) for name in FITS]
-    return FoldTimes(statistics.median(mine), statistics.median(its), reached)
+    return FoldTimes(statistics.median(own_s), statistics.median(sklearn_s), reached)
 
 
 def report(laps: list[FoldTimes], alone: float, folds: int) -> dict[str, Any]:
-    """Return the figures of a race; `alone` is the time of our other folds [s]."""
-    mine, its = sum(lap.mine for lap in laps), sum(lap.its for lap in laps)
-    ours, theirs = likelihoods_of(laps)
-    part = f"study, {ours.size} fits with predictions"
+    """Return the figures of a race; `alone`: time of the folds not raced [s]."""
+    own_s, sklearn_s = (
+        sum(lap.own_s for lap in laps),
+        sum(lap.sklearn_s for lap in laps),
+    )
+    own, sklearn = likelihoods_of(laps)
+    part = f"study, {own.size} fits with predictions"
     if len(laps) < folds:
         part += (
             f" in {len(laps)} of {folds} folds drawn at random, the other "
-            f"{folds - len(laps)} by ours alone in {1e3 * alone:.0f} ms"
+            f"{folds - len(laps)} by this project alone in {1e3 * alone:.0f} ms"
         )
     return {
         "part": part,
-        "ours_ms": 1e3 * mine,
-        "other_ms": 1e3 * its,
-        "ratio": its / mine,
+        "ours_ms": 1e3 * own_s,
+        "other_ms": 1e3 * sklearn_s,
+        "ratio": sklearn_s / own_s,
         "goal": _GOAL,
-        "reached": float(ours.sum()),
-        "other_reached": float(theirs.sum()),
+        "reached": float(own.sum()),
+        "other_reached": float(sklearn.sum()),
     }
 
 
-def compared(laps: list[FoldTimes]) -> list[str]:
-    """Return a line: in how many fits either side's likelihood is larger."""
-    ours, theirs = likelihoods_of(laps)
-    worse = int(np.count_nonzero(ours < theirs - 1e-3))
-    better = int(np.count_nonzero(ours > theirs + 1e-3))
+def likelihood_comparison(laps: list[FoldTimes]) -> list[str]:
+    """Return a line with the number of fits in which each side is more likely."""
+    own, sklearn = likelihoods_of(laps)
+    worse = int(np.count_nonzero(own < sklearn - 1e-3))
+    better = int(np.count_nonzero(own > sklearn + 1e-3))
     return [
         f"likelihood lower than scikit-learn's by more than 1e-3: {worse} of "
-        f"{ours.size} fits; higher: {better}"
+        f"{own.size} fits; higher: {better}"
     ]
 
 
 def likelihoods_of(laps: list[FoldTimes]) -> tuple[np.ndarray, np.ndarray]:
-    """Return our and scikit-learn's likelihoods, one per fit."""
+    """Return this project's and scikit-learn's likelihoods, one per fit."""
     pairs = [pair for lap in laps for pair in lap.reached]
-    ours, theirs = (np.array(column) for column in zip(*pairs, strict=True))
-    return ours, theirs
+    own, sklearn = (np.array(column) for column in zip(*pairs, strict=True))
+    return own, sklearn
 
 
 def starts_of(task: FoldTask) -> dict[str, tuple[Array, ...]]:
@@ -210,8 +213,8 @@ def run_sklearn(
     return likelihoods
 
 
-def where_time_goes(task: FoldTask) -> list[str]:
-    """Return a line with the processor time of the parts of one of our folds."""
+def time_breakdown(task: FoldTask) -> list[str]:
+    """Return a line with the processor time of the parts of one fold."""
     training = TrainingSet(task.training, task.lengths, choose_rows(task))
     fitter = ModelFitter(training, task.options)
     cpu_s, _ = timed(lambda: fitter.fit(TUSTIN))
@@ -228,7 +231,7 @@ def where_time_goes(task: FoldTask) -> list[str]:
         predicting += timed(lambda m=model: m.mean(tested.F_n, tested.v_t))[0]
         predicting += timed(lambda m=model: m.predict(held_out.F_n, held_out.v_t))[0]
     parts.append(f"predictions of {tested.count} rows {1e3 * predicting:.0f} ms")
-    return ["one of our folds: " + ", ".join(parts)]
+    return ["one fold: " + ", ".join(parts)]
 
 
 def timed(function: Callable[[], Any]) -> tuple[float, Any]:
