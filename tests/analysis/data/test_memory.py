@@ -37,7 +37,7 @@ def test_without_information_the_budget_is_the_minimum(computer, text):
 
 
 def test_a_process_limit_may_lower_the_budget():
-    """In a process of its own, as a limit cannot be raised again."""
+    """In a separate process, because a limit cannot be raised again."""
     program = (
         "import resource\n"
         "from analysis.data.memory import share_of_memory\n"

@@ -31,7 +31,7 @@ def test_speed_counts_in_both_directions():
     assert coverage([Trial([-0.3], [1.0])]).counts[3, 0] == 1
 
 
-def test_the_thinnest_reachable_cell_is_named():
+def test_the_thinnest_reachable_cell_is_reported():
     counts = np.full((4, 4), 100)
     counts[1, 2], counts[2, 1] = 1, 2
     assert thinnest(CoverageGrid(counts)) == "slower than 0.05 m/s, above 5 N"

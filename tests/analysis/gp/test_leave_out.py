@@ -16,11 +16,11 @@ def test_leaving_rows_out_equals_fitting_without_them(kernel, within):
     y = np.sin(X[:, 0]) + rng.normal(size=4)[trial] + rng.normal(0.0, 0.2, 60)
     trials = TrialRows(trial)
     process = fit_gp(X, y, kernel, TrialNoise(within), trials=trials)
-    new, without = rng.uniform(0.5, 5.0, (30, 2)), LeaveOut(process)
+    new, leave_out = rng.uniform(0.5, 5.0, (30, 2)), LeaveOut(process)
     for k, rows in enumerate(trials.blocks()):
-        rest = trial != k
-        others = TrialRows(trial[rest])
-        mean, variance = process.given(X[rest], y[rest], others).predict(new)
-        found = without.predict(rows, new)
-        np.testing.assert_allclose(found[0], mean, atol=1e-9)
-        np.testing.assert_allclose(found[1], variance, rtol=1e-8)
+        kept = trial != k
+        others = TrialRows(trial[kept])
+        mean, variance = process.given(X[kept], y[kept], others).predict(new)
+        prediction = leave_out.predict(rows, new)
+        np.testing.assert_allclose(prediction[0], mean, atol=1e-9)
+        np.testing.assert_allclose(prediction[1], variance, rtol=1e-8)

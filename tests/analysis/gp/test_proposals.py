@@ -1,4 +1,4 @@
-"""A kernel that lists its hyperparameters is searched like the others."""
+"""Proposals and bounds of the search follow from a kernel's hyperparameters."""
 
 from dataclasses import dataclass
 
@@ -22,7 +22,7 @@ SE, NN = SquaredExponential(2), Arcsine(2)
 
 @dataclass(frozen=True, slots=True)
 class Linear(Composable):
-    """k = sf^2 x x' of the first input."""
+    """k = sf^2 x x' for the first input."""
 
     parameters = (Hyperparameter("log_sf", Role.SIZE),)
 

@@ -96,7 +96,7 @@ def test_kernels_have_the_reference_values(vectors, name):
     assert KERNELS[name].diagonal(theta, X)[0] == pytest.approx(case["k00"], rel=1e-14)
 
 
-def test_gradient_agrees_with_differences_for_any_weights(vectors):
+def test_gradient_agrees_with_finite_differences_for_any_weights(vectors):
     X, _, _, _ = load(vectors, "n12")
     theta, h = np.array([0.3, -0.2, 0.4]), 1e-6
     W = np.random.default_rng(0).normal(size=(12, 12))
@@ -112,13 +112,13 @@ def test_gradient_agrees_with_differences_for_any_weights(vectors):
 def test_search_reaches_the_reference_optimum(vectors, kernel, case):
     data = vectors["optimised_n100"]
     X, y = np.array(data["X"]), np.array(data["y"])
-    found = posterior_search(kernel, ConstantNoise(), X, y)
+    optimum = posterior_search(kernel, ConstantNoise(), X, y)
     best = data[case].get("polished_lml", data[case].get("lml"))
-    assert found.lml == pytest.approx(best, abs=1e-4)
+    assert optimum.lml == pytest.approx(best, abs=1e-4)
     theta = data[case].get("polished_theta", data[case].get("theta"))
-    np.testing.assert_allclose(found.theta, theta, atol=1e-2)
-    assert len(found.starts) == len(found.start_points) > 1
-    assert found.lml == max(start.lml for start in found.starts)
+    np.testing.assert_allclose(optimum.theta, theta, atol=1e-2)
+    assert len(optimum.starts) == len(optimum.start_points) > 1
+    assert optimum.lml == max(start.lml for start in optimum.starts)
 
 
 def test_likelihood_and_prediction_agree_with_scikit_learn(vectors):
@@ -127,27 +127,27 @@ def test_likelihood_and_prediction_agree_with_scikit_learn(vectors):
 
     X, y, Xt, _ = load(vectors, "n60")
     sf, lengths, sn = 1.3, np.array([0.9, 1.7]), 0.4
-    theirs = GaussianProcessRegressor(
+    reference = GaussianProcessRegressor(
         ConstantKernel(sf**2) * RBF(lengths) + WhiteKernel(sn**2),
         alpha=1e-300,
         optimizer=None,
     ).fit(X, y)
     theta = np.log([sf, *lengths, sn])
     lml, slope = Likelihood(SE, ConstantNoise(), X, y)(theta)
-    value, gradient = theirs.log_marginal_likelihood(
-        theirs.kernel_.theta, eval_gradient=True
+    value, gradient = reference.log_marginal_likelihood(
+        reference.kernel_.theta, eval_gradient=True
     )
     assert lml == pytest.approx(value, rel=1e-10)
-    # theirs is by the logarithms of variances for sf and sn
+    # scikit-learn's parameters are log sf^2 and log sn^2
     np.testing.assert_allclose(slope, gradient * [2, 1, 1, 2], rtol=1e-7)
-    mean, sd = theirs.predict(Xt, return_std=True)
-    ours, variance = process(X, y, theta, ConstantNoise()).predict(Xt)
-    np.testing.assert_allclose(ours, mean, rtol=1e-9)
+    mean, sd = reference.predict(Xt, return_std=True)
+    own_mean, variance = process(X, y, theta, ConstantNoise()).predict(Xt)
+    np.testing.assert_allclose(own_mean, mean, rtol=1e-9)
     np.testing.assert_allclose(np.sqrt(variance), sd, rtol=1e-9)
 
 
 @pytest.mark.parametrize("kernel", [SE, Arcsine(2)])
-def test_gradient_of_many_rows_agrees_with_differences(kernel):
+def test_gradient_of_many_rows_agrees_with_finite_differences(kernel):
     X, y = draw(np.random.default_rng(2), 190)  # inverted block by block
     likelihood = Likelihood(kernel, ConstantNoise(), X, y)
     theta = np.random.default_rng(5).normal(0, 0.3, len(kernel.names) + 1)
@@ -159,15 +159,15 @@ def test_gradient_of_many_rows_agrees_with_differences(kernel):
 
 
 @pytest.mark.parametrize("kernel", [SE, Arcsine(2), SE + Arcsine(2), SE * SE])
-def test_an_evaluation_keeps_no_memory(kernel):
+def test_an_evaluation_does_not_depend_on_earlier_ones(kernel):
     X, y = draw(np.random.default_rng(2), 100)
     rng = np.random.default_rng(6)
-    here, there = rng.normal(0, 0.3, (2, len(kernel.names) + 1))
-    kept = Likelihood(kernel, ConstantNoise(), X, y)
-    kept(there)
-    lml, slope = kept(here)
-    kept(there)
-    expected, fresh = Likelihood(kernel, ConstantNoise(), X, y)(here)
+    theta, other = rng.normal(0, 0.3, (2, len(kernel.names) + 1))
+    reused = Likelihood(kernel, ConstantNoise(), X, y)
+    reused(other)
+    lml, slope = reused(theta)
+    reused(other)
+    expected, fresh = Likelihood(kernel, ConstantNoise(), X, y)(theta)
     assert lml == expected
     np.testing.assert_array_equal(slope, fresh)
 
@@ -194,7 +194,7 @@ def test_known_noise_is_recovered_with_nominal_coverage():
     inside = np.mean(np.abs(y[300:] - mean) <= 1.96 * np.sqrt(variance))
     # 200 samples: three binomial standard deviations are 0.046
     assert abs(inside - 0.95) < 0.046
-    # its standard error is 0.5/sqrt(2 300)
+    # standard error: 0.5/sqrt(2 * 300)
     assert np.exp(model.theta[-1]) == pytest.approx(0.5, abs=0.07)
 
 
@@ -210,18 +210,18 @@ def test_bands_of_a_known_process_have_nominal_coverage(repeats):
         mean, variance = model.predict(X[100:101])
         inside += list(np.abs(y[100:101] - mean) / np.sqrt(variance))
     for share, width in ((0.5, 0.67449), (0.9, 1.64485), (0.95, 1.95996)):
-        found = np.mean(np.array(inside) <= width)
+        coverage = np.mean(np.array(inside) <= width)
         # one independent sample per draw: three binomial standard deviations
-        assert abs(found - share) <= 3 * np.sqrt(share * (1 - share) / repeats)
+        assert abs(coverage - share) <= 3 * np.sqrt(share * (1 - share) / repeats)
 
 
 def test_likelihood_does_not_depend_on_the_order_of_rows():
     X, y = draw(np.random.default_rng(3), 50)
     theta = np.log([2.0, 0.8, 1.5, 0.5])
     order = np.random.default_rng(1).permutation(50)
-    straight = Likelihood(SE, ConstantNoise(), X, y)(theta)[0]
+    ordered = Likelihood(SE, ConstantNoise(), X, y)(theta)[0]
     mixed = Likelihood(SE, ConstantNoise(), X[order], y[order])(theta)[0]
-    assert mixed == pytest.approx(straight, rel=1e-12)
+    assert mixed == pytest.approx(ordered, rel=1e-12)
 
 
 def test_predictions_follow_a_change_of_units():
@@ -261,7 +261,7 @@ def test_blocks_do_not_change_a_prediction(monkeypatch):
     assert model.mean(np.zeros((0, 2))).shape == (0,)
 
 
-def test_jitter_is_added_only_where_it_is_needed_and_is_recorded():
+def test_jitter_is_added_only_if_needed_and_is_recorded():
     K = np.ones((30, 30))
     assert factorise(K, np.full(30, 0.1)).jitter == 0.0
     assert factorise(K, np.full(30, -1e-11)).jitter == pytest.approx(1e-10)
@@ -287,7 +287,7 @@ def test_uninformative_outputs_are_refused(y, reason):
         fit_gp(np.random.default_rng(0).normal(size=(y.size, 2)), y)
 
 
-def test_conditioning_on_own_rows_changes_nothing_and_on_others_does(vectors):
+def test_only_conditioning_on_new_rows_changes_the_prediction(vectors):
     X, y, Xt, _ = load(vectors, "n60")
     fitted = fit_gp(X[:40], y[:40])
     same, more = fitted.given(X[:40], y[:40]), fitted.given(X, y)

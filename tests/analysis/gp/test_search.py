@@ -20,9 +20,9 @@ KERNELS = {
 
 
 class Hills:
-    """A likelihood with a top of given centre, height and width at every hill.
+    """A likelihood with hills of given centre, height and width.
 
-    `rough` is the likelihood of a subset of the rows; `hole`: where it has no value.
+    `rough`: likelihood of a subset of the rows; `hole`: where it is undefined.
     """
 
     kernel, noise, trials = SE, ConstantNoise(), None
@@ -72,7 +72,7 @@ def test_a_new_start_is_far_from_known_optima(length):
     search.climb(search.designed_start())
     search.move()
     optimum = search.optimum()
-    # lengths beyond e^4 standard deviations are all the same
+    # lengths beyond e^4 standard deviations are equivalent
     known = np.minimum([optimum.starts[0].theta, optimum.start_points[0]], 4.0)
     for moved in optimum.start_points[1:]:
         gaps = np.abs(known - np.minimum(moved, 4.0))[:, 1:3]
@@ -85,8 +85,8 @@ def test_a_neighbouring_optimum_is_found(apart):
     high = low + np.array([0.0, apart, 0.0, 0.0])
     both = Hills((low, 5.0, 0.15), (high, 5.1, 0.15))
     assert climb_from(both, [low]).theta[1] == pytest.approx(low[1], abs=0.05)
-    found = climb_from(both, [low], is_searched=True)
-    assert found.theta[1] == pytest.approx(high[1], abs=0.05)
+    optimum = climb_from(both, [low], is_searched=True)
+    assert optimum.theta[1] == pytest.approx(high[1], abs=0.05)
 
 
 def test_no_neighbour_is_searched_along_an_inactive_length():
@@ -115,7 +115,7 @@ def test_points_without_a_likelihood_are_not_starts():
     assert all(start[1] >= -1 for start in optimum.start_points)
 
 
-def test_hyperparameters_at_the_edge_of_the_search_are_named():
+def test_hyperparameters_at_a_bound_of_the_search_are_reported():
     edge = bounds(SE, 1.0, ROWS.std(axis=0))[2, 1]
     optimum = maximise_posterior(
         Hills((np.array([0.0, 0.0, edge + 1.0, 0.0]), 9.0, 2.0))
@@ -144,7 +144,7 @@ def test_kernels_of_other_dimensions_are_searched_too(dimensions):
     y = np.sin(2 * X[:, 0]) + np.random.default_rng(3).normal(0, 0.1, 40)
     for kernel in (SquaredExponential(dimensions), Arcsine(dimensions)):
         optimum = posterior_search(kernel, ConstantNoise(), X, y)
-        # a constant of the outputs' own spread explains nothing
+        # better than a constant with the outputs' own spread
         assert optimum.lml > -0.5 * 40 * (1 + np.log(2 * np.pi * y.var())) + 10
 
 
@@ -168,9 +168,9 @@ def test_an_input_with_a_long_length_is_tried_as_inactive():
 def test_moves_of_a_sum_are_those_of_one_part_at_a_time():
     theta = np.arange(7.0)
     kinds = moves(SE + Arcsine(2), theta)
-    of_left, of_right = moves(SE, theta[:3]), moves(Arcsine(2), theta[3:])
-    assert len(kinds) == len(of_left) + len(of_right)
-    for kind, alone in zip(kinds, [*of_left, *of_right], strict=True):
+    left_moves, right_moves = moves(SE, theta[:3]), moves(Arcsine(2), theta[3:])
+    assert len(kinds) == len(left_moves) + len(right_moves)
+    for kind, alone in zip(kinds, [*left_moves, *right_moves], strict=True):
         is_left = len(alone[0]) == 3
         moved, kept = (slice(0, 3), slice(3, 7)) if is_left else (slice(3, 7), slice(3))
         np.testing.assert_array_equal(np.array(kind)[:, moved], alone)

@@ -13,7 +13,7 @@ from analysis.gp.trial_level import (
 
 
 def drawn(count, between, within=2.5, tau=0.5, noise=0.3, seconds=12.0, seed=0):
-    """Return times and residuals of trials, a row every 0.1 s."""
+    """Return random times and residuals of trials, a row every 0.1 s."""
     rng = np.random.default_rng(seed)
     rho = np.exp(-0.1 / tau)
     trials = []
@@ -45,22 +45,22 @@ def test_the_spread_of_few_trials_is_estimated_by_restricted_likelihood():
 
 
 def test_correlated_residuals_are_not_mistaken_for_trial_spread():
-    found = [
+    spreads = [
         estimate_levels(
             TrialResiduals(drawn(40, 0.0, within=2.0, tau=0.5, seed=s))
         ).between
         for s in range(4)
     ]
-    # the means of such trials vary by 0.58 N
-    assert np.mean(found) < 0.35
+    # standard deviation of the means of such trials: 0.58 N
+    assert np.mean(spreads) < 0.35
 
 
 def test_sums_without_a_trial_equal_those_of_the_others():
     trials = drawn(6, 1.0)
     sums = LevelSums.of(TrialResiduals(trials), 1.5)
-    for k, found in enumerate(sums.without_each()):
-        rest = LevelSums.of(TrialResiduals(trials[:k] + trials[k + 1 :]), 1.5)
-        assert found == pytest.approx(rest.variance(), rel=1e-9, abs=1e-12)
+    for k, variance in enumerate(sums.without_each()):
+        others = LevelSums.of(TrialResiduals(trials[:k] + trials[k + 1 :]), 1.5)
+        assert variance == pytest.approx(others.variance(), rel=1e-9, abs=1e-12)
 
 
 def test_the_likelihood_is_that_of_the_dense_covariance():
@@ -68,16 +68,16 @@ def test_the_likelihood_is_that_of_the_dense_covariance():
     theta = np.log([0.3, 0.8, 1.7, 0.4])
     sn, sc, so, tau = np.exp(theta)
     ones, precision, cost = 0.0, 0.0, 0.0
-    solved = []
+    costs = []
     for k, n in enumerate(residuals.counts):
         t, r = residuals.t[k, :n], residuals.r[k, :n]
         C = so**2 * np.exp(-np.abs(t[:, None] - t) / tau) + sn**2 * np.eye(n) + sc**2
         u = np.linalg.solve(C, np.ones(n))
         precision, ones = precision + u.sum(), ones + u @ r
-        solved.append(0.5 * (np.linalg.slogdet(C)[1] + r @ np.linalg.solve(C, r)))
-    cost = sum(solved) + 0.5 * (np.log(precision) - ones**2 / precision)
-    found = RestrictedLikelihood(residuals).costs(theta[None, :])[0]
-    assert found == pytest.approx(cost, rel=1e-9)
+        costs.append(0.5 * (np.linalg.slogdet(C)[1] + r @ np.linalg.solve(C, r)))
+    cost = sum(costs) + 0.5 * (np.log(precision) - ones**2 / precision)
+    computed = RestrictedLikelihood(residuals).costs(theta[None, :])[0]
+    assert computed == pytest.approx(cost, rel=1e-9)
 
 
 def test_a_single_trial_has_no_spread():

@@ -49,7 +49,7 @@ def test_a_stated_clock_is_used_and_the_doubt_reported(imported):
 
 
 @pytest.mark.slow
-def test_a_sensor_clock_that_runs_fast_is_named_with_its_drift(imported):
+def test_a_sensor_clock_that_runs_fast_is_reported_with_its_drift(imported):
     stroke_log = StrokeLog(clock_rate=1.001)
     with pytest.raises(SettingsError, match=r"drift \+1000 ppm, 12 ms over the log"):
         imported(stroke_log)
@@ -143,7 +143,7 @@ def test_delayed_messages_raise_no_doubt_of_the_clock():
         assert fit.offset == pytest.approx(0.0, abs=5e-4)
 
 
-def test_a_step_is_named_with_its_time():
+def test_a_step_is_reported_with_its_time():
     fit = fit_clock(*times(step=0.05))
     (doubt, *_) = doubts_of_clock("/a", fit)
     assert "jump by 50 ms" in doubt

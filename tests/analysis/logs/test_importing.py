@@ -104,7 +104,7 @@ def test_checks_confirm_correct_statements(imported):
         ({"normal": np.array([0.2, 0.0, 1.0])}, "degrees off --normal"),
     ],
 )
-def test_a_check_that_disagrees_is_named_and_not_applied(
+def test_a_check_that_disagrees_is_reported_and_not_applied(
     imported, right, options, words
 ):
     found = imported(TURNED, **options)
@@ -173,7 +173,7 @@ def test_a_reaction_force_sensor_is_read_with_the_matching_option(imported):
     ("axes", "words"),
     [((1, 0, 2), "moments are -1.0 times"), ((2, 1, 0), "F_t exceeds F_n")],
 )
-def test_exchanged_axes_are_named(imported, axes, words):
+def test_exchanged_axes_are_reported(imported, axes, words):
     found = imported(StrokeLog(axes=axes))
     assert any(words in text for text in found.warnings)
 
@@ -199,7 +199,7 @@ def test_slow_joint_states_are_refused_unless_means_are_requested(imported):
     )
 
 
-def test_another_frame_in_the_header_is_named(imported):
+def test_another_frame_in_the_header_is_reported(imported):
     found = imported(StrokeLog(frame_id="tool0"))
     assert any("frame 'tool0'; 'gauge' is used" in text for text in found.warnings)
 

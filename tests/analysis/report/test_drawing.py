@@ -27,10 +27,10 @@ def store(tmp_path):
 
 @pytest.fixture
 def drawings(monkeypatch):
-    """A list of all that was drawn; each drawing is one figure."""
+    """A list of all drawn figures."""
     drawn = []
 
-    @wraps(drawing.report_figures)  # pictures are kept by its module and name
+    @wraps(drawing.report_figures)  # pictures are stored by its module and name
     def draw(shown):
         drawn.append(shown)
         return [FIGURE]

@@ -1,4 +1,4 @@
-"""The tares of a session predict the known errors of its forces."""
+"""The uncertainty estimated from tares agrees with uncertainty errors of forces."""
 
 from types import SimpleNamespace
 
@@ -13,7 +13,7 @@ from analysis.report.force_uncertainty import (
 )
 
 STEP, EVERY = 0.1, 250  # s; steps from one tare to the next
-TARE, FIRST, LAST = 10, 40, 190  # steps: length of a tare, begin and end of a trial
+TARE, FIRST, LAST = 10, 40, 190  # steps: length of a tare, start and end of a trial
 
 
 def paths(step):
@@ -22,7 +22,7 @@ def paths(step):
     return step(rng.standard_normal((600, 11 * EVERY)))
 
 
-def wandering(time):
+def random_drift(time):
     keep = np.exp(-STEP / time)
 
     def walk(noise):
@@ -35,8 +35,8 @@ def wandering(time):
     return walk
 
 
-def steady(noise):
-    """A zero that drifts as a random walk."""
+def random_walk(noise):
+    """Return a zero that drifts as a random walk."""
     return 0.02 * np.cumsum(noise, axis=1)
 
 
@@ -47,14 +47,14 @@ def errors(zero):
     inside = trials[:, :-1, FIRST:LAST]
     share = (np.arange(FIRST, LAST) - TARE / 2) / EVERY
     first, change = tares[:, :-1, None], np.diff(tares, axis=1)[:, :, None]
-    found = {}
+    rms_errors = {}
     for name, error in (
         ("", inside - first),
         ("interpolated_", inside - first - share * change),
     ):
-        found[f"{name}sample"] = np.sqrt(np.mean(error**2))
-        found[f"{name}mean"] = np.sqrt(np.mean(error.mean(axis=2) ** 2))
-    return found, ForceUncertainty(10, float(np.sqrt(np.mean(change**2))))
+        rms_errors[f"{name}sample"] = np.sqrt(np.mean(error**2))
+        rms_errors[f"{name}mean"] = np.sqrt(np.mean(error.mean(axis=2) ** 2))
+    return rms_errors, ForceUncertainty(10, float(np.sqrt(np.mean(change**2))))
 
 
 KINDS = ("sample", "mean", "interpolated_sample", "interpolated_mean")
@@ -62,24 +62,24 @@ KINDS = ("sample", "mean", "interpolated_sample", "interpolated_mean")
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_tares_predict_the_error_of_a_fast_wandering_zero(kind):
-    found, predicted = errors(paths(wandering(3.0)))
-    assert getattr(predicted, kind) == pytest.approx(found[kind], rel=0.12)
+    rms_errors, predicted = errors(paths(random_drift(3.0)))
+    assert getattr(predicted, kind) == pytest.approx(rms_errors[kind], rel=0.12)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_slowly_wandering_zero_is_never_underestimated(kind):
-    found, predicted = errors(paths(steady))
-    assert found[kind] < getattr(predicted, kind)
+    rms_errors, predicted = errors(paths(random_walk))
+    assert rms_errors[kind] < getattr(predicted, kind)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_steady_wander_is_overestimated_at_most_twofold(kind):
-    found, predicted = errors(paths(steady))
-    assert getattr(predicted, kind) < 2.0 * found[kind]
+    rms_errors, predicted = errors(paths(random_walk))
+    assert getattr(predicted, kind) < 2.0 * rms_errors[kind]
 
 
 def trial(bias, change=None, session="S001"):
-    """A trial with nothing but its tares."""
+    """Return a stub of a trial with its tares only."""
     bracket = None
     if change is not None:
         biases = np.stack([np.full(6, bias), np.full(6, bias + change)])
@@ -107,6 +107,6 @@ def test_without_brackets_the_tares_of_the_next_trials_are_used():
 
 
 def test_the_uncertainty_floor_combines_tare_change_and_noise():
-    known = ForceUncertainty(10, 0.3)
-    assert known.floor(0.0) == pytest.approx(0.3 * np.sqrt(2 / np.pi))
-    assert known.floor(0.4) == pytest.approx(0.5 * np.sqrt(2 / np.pi))
+    uncertainty = ForceUncertainty(10, 0.3)
+    assert uncertainty.floor(0.0) == pytest.approx(0.3 * np.sqrt(2 / np.pi))
+    assert uncertainty.floor(0.4) == pytest.approx(0.5 * np.sqrt(2 / np.pi))

@@ -11,19 +11,19 @@ from analysis.study.study import StudyOptions, run_study
 
 pytestmark = pytest.mark.slow
 
-MARGIN = 0.02  # inches: half a line that lies on the edge
+MARGIN = 0.02  # inches, half the width of a line on the edge
 
 
 @pytest.fixture(scope="module")
 def findings(small_study, slice_trials):
-    """The results of three terrains, and of one alone."""
+    """Results of three terrains and of one terrain."""
     options = StudyOptions(fit=FitOptions(gp_points=80), n_jobs=1)
     alone = run_study({"TF": slice_trials["TF"]}, options, simulated=True)
     return {"three": compute_results(small_study), "one": compute_results(alone)}
 
 
 def is_whole(figure):
-    """Return whether everything drawn lies on the figure."""
+    """Return whether all artists lie within the figure."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     canvas = FigureCanvasAgg(figure)

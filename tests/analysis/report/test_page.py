@@ -26,7 +26,7 @@ pytestmark = [
     pytest.mark.timeout(900),
     pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine"),
 ]
-WIDTHS = (1600, 800, 500)  # of a desktop and down to the narrowest window that opens
+WIDTHS = (1600, 800, 500)  # from a desktop to the narrowest possible window
 _BROWSER = "not an origin"
 PROBE = """<script>
 addEventListener("load", () => {
@@ -36,7 +36,7 @@ addEventListener("load", () => {
     broken: images.filter(image => !image.complete || image.naturalWidth < 300).length
       + [...document.querySelectorAll(".drawing svg")].filter(
         drawing => drawing.getBoundingClientRect().height < 100).length,
-    unsaid: images.filter(image => image.alt.length < 20).length
+    without_text: images.filter(image => image.alt.length < 20).length
       + [...document.querySelectorAll(".drawing")].filter(
         drawing => drawing.getAttribute("aria-label").length < 20).length,
     overflow: document.documentElement.scrollWidth - innerWidth,
@@ -60,33 +60,33 @@ USE = """<script>
 addEventListener("load", () => {
   const column = () => [...document.querySelectorAll("tbody tr")].map(
     row => row.cells[1].textContent);
-  const found = { buttons: document.querySelectorAll("thead button").length };
+  const result = { buttons: document.querySelectorAll("thead button").length };
   document.querySelectorAll("thead button")[1].click();
-  found.up = column();
+  result.up = column();
   document.querySelectorAll("thead button")[1].click();
-  found.down = column();
+  result.down = column();
   const svg = document.querySelector(".drawing svg"), box = svg.getBoundingClientRect();
   const point = (kind, x, y) => svg.dispatchEvent(new PointerEvent(kind, {
     clientX: box.left + x * box.width, clientY: box.top + y * box.height,
     pointerId: 1, pointerType: "mouse", bubbles: true }));
   svg.setPointerCapture = () => {};
-  found.whole = svg.getAttribute("viewBox");
+  result.whole = svg.getAttribute("viewBox");
   point("pointermove", 0.5, 0.5);
-  found.readout = document.querySelector(".readout").textContent;
+  result.readout = document.querySelector(".readout").textContent;
   point("pointerdown", 0.4, 0.4);
   point("pointermove", 0.6, 0.6);
   point("pointerup", 0.6, 0.6);
-  found.part = svg.getAttribute("viewBox");
+  result.part = svg.getAttribute("viewBox");
   svg.dispatchEvent(new MouseEvent("dblclick"));
-  found.again = svg.getAttribute("viewBox");
-  document.title = "probe " + JSON.stringify(found);
+  result.again = svg.getAttribute("viewBox");
+  document.title = "probe " + JSON.stringify(result);
 });
 </script>"""
 
 
 @dataclass(frozen=True)
 class Opened:
-    """The output of a browser for a page, and the addresses the page requested."""
+    """Output of a browser for a page, and the addresses that the page requested."""
 
     out: str
     console: list[str]
@@ -109,7 +109,7 @@ def open_page(page: Path, folder: Path, *options: str) -> Opened:
     params = [
         event.get("params", {}) for event in json.loads(log.read_text())["events"]
     ]
-    # requests of the browser itself have no page as their origin
+    # requests by the browser itself have no page as origin
     urls = {
         p["url"]
         for p in params
@@ -121,22 +121,22 @@ def open_page(page: Path, folder: Path, *options: str) -> Opened:
 
 
 def probe(page: Path, folder: Path, width: int, script: str = PROBE) -> dict:
-    """Return the result of a script that is run in a copy of the page."""
+    """Return the result of a script run in a copy of the page."""
     copy = folder / "probe.html"
     copy.write_text(page.read_text().replace("</body>", script + "</body>"))
     opened = open_page(copy, folder, f"--window-size={width},2000", "--dump-dom")
-    found = re.search(r"<title>probe (.*?)</title>", opened.out)
-    assert found is not None, opened.out[:500]
-    return json.loads(found.group(1).replace("&quot;", '"'))
+    result = re.search(r"<title>probe (.*?)</title>", opened.out)
+    assert result is not None, opened.out[:500]
+    return json.loads(result.group(1).replace("&quot;", '"'))
 
 
 def assert_readable(page: Path, folder: Path, least: int) -> None:
-    """Fail unless the page shows everything, requests nothing, and prints."""
+    """Require a page without overflow, requests or errors, also in print."""
     for width in WIDTHS:
-        found = probe(page, folder, width)
-        assert found.pop("figures") >= least
-        assert found.pop("overflow") <= 0
-        assert set(found.values()) == {0}, found
+        result = probe(page, folder, width)
+        assert result.pop("figures") >= least
+        assert result.pop("overflow") <= 0
+        assert set(result.values()) == {0}, result
     picture, printed = folder / "page.png", folder / "page.pdf"
     screen = open_page(
         page, folder, "--window-size=1200,12000", f"--screenshot={picture}"
@@ -168,8 +168,8 @@ def test_a_report_is_readable_on_screen_and_paper(small_study, tmp_path):
 
 
 def test_the_summary_fits_a_small_screen(small_study, tmp_path):
-    found = probe(written(small_study, tmp_path), tmp_path, 1280, SUMMARY)
-    assert found == {"hidden": 0, "columns": 12}
+    result = probe(written(small_study, tmp_path), tmp_path, 1280, SUMMARY)
+    assert result == {"hidden": 0, "columns": 12}
 
 
 def small_page(folder: Path) -> Path:
@@ -190,19 +190,19 @@ def small_page(folder: Path) -> Path:
 
 
 def test_a_table_is_sorted_and_a_drawing_is_read_and_enlarged(tmp_path):
-    found = probe(small_page(tmp_path), tmp_path, 1200, USE)
-    assert found["buttons"] == 2
-    assert found["up"] == ["\u22122", "≤ 0.5", "10&nbsp;±&nbsp;1", "–"]
-    assert found["down"] == found["up"][::-1]
+    result = probe(small_page(tmp_path), tmp_path, 1200, USE)
+    assert result["buttons"] == 2
+    assert result["up"] == ["\u22122", "≤ 0.5", "10&nbsp;±&nbsp;1", "–"]
+    assert result["down"] == result["up"][::-1]
     x, y = map(
-        float, re.findall(r"[xy] (\S+)", found["readout"].replace("\u2212", "-"))
+        float, re.findall(r"[xy] (\S+)", result["readout"].replace("\u2212", "-"))
     )
     assert 1.5 < x < 2.5
     assert abs(y) < 0.3
-    whole, part = (list(map(float, found[k].split())) for k in ("whole", "part"))
+    whole, part = (list(map(float, result[k].split())) for k in ("whole", "part"))
     assert part[2] == pytest.approx(0.2 * whole[2], rel=0.02)
     assert part[3] == pytest.approx(0.2 * whole[3], rel=0.02)
-    assert found["again"] == found["whole"]
+    assert result["again"] == result["whole"]
 
 
 def test_a_page_with_requests_or_errors_is_detected(tmp_path):

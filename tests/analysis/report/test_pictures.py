@@ -38,18 +38,18 @@ def test_a_picture_of_256_colours_is_exact():
 def test_white_and_frequent_colours_stay_exact():
     page = shaded()
     page[200:300] = (0, 114, 178)
-    found = read(png_of_few_colours(opaque(page), 320))
+    pixels = read(png_of_few_colours(opaque(page), 320))
     is_plain = np.ones(page.shape[:2], dtype=bool)
     is_plain[100:164, 100:164] = False
-    np.testing.assert_array_equal(found[is_plain], page[is_plain])
+    np.testing.assert_array_equal(pixels[is_plain], page[is_plain])
 
 
 def test_shades_beyond_the_palette_are_close():
     page = shaded()
-    found = read(png_of_few_colours(opaque(page), 320))
+    pixels = read(png_of_few_colours(opaque(page), 320))
     square = (slice(100, 164), slice(100, 164))
-    # 128 colours for 4,096 shades over a plane: some 24 of 256 apart
-    assert np.abs(found[square] - page[square]).max() < 32
+    # 128 colours for 4,096 shades of a plane: about 24 of 256 apart
+    assert np.abs(pixels[square] - page[square]).max() < 32
 
 
 def test_a_palette_is_full_and_the_resolution_is_stated():

@@ -35,7 +35,7 @@ HOSTILE = "<script>$x_1</b>&"
 
 
 class Page(HTMLParser):
-    """Every tag with its attributes, and the text between them."""
+    """Parses every tag with its attributes, and the text in between."""
 
     def __init__(self, text):
         super().__init__()
@@ -162,7 +162,7 @@ def test_a_report_without_pdfs_removes_earlier_ones(small_study, tmp_path, monke
     write_report(small_study, tmp_path, context(with_pdf=True))
     figures = tmp_path / "figures"
     assert {file.suffix for file in figures.iterdir()} == {".pdf", ".png"}
-    for name in ("rig.png", "notes.pdf"):  # of no figure today, and a user's own
+    for name in ("rig.png", "notes.pdf"):  # a removed figure, and a user's file
         (figures / name).write_bytes(b"x")
     page = Page(write_report(small_study, tmp_path, context()).read_text())
     assert [file.name for file in figures.glob("*.pdf")] == ["notes.pdf"]
@@ -185,7 +185,7 @@ def hostile_study(make_series, moving):
 
 def test_markup_in_names_stays_text(hostile_study):
     page = Page(render_page(compute_results(hostile_study), [], context(title=HOSTILE)))
-    assert page.attributes("script") == [{}]  # the page's own
+    assert page.attributes("script") == [{}]  # the script of the page
     assert page.text.count(HOSTILE) > 3
     assert "LIVE" in page.text
 

@@ -1,4 +1,4 @@
-"""Tables of a report state the uncertainty of their numbers."""
+"""Uncertainties and tests in the tables of a report."""
 
 import re
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""A figure does not depend on the backend or the style of its user."""
+"""A figure does not depend on the user's matplotlib backend or style."""
 
 import os
 import subprocess

@@ -88,7 +88,7 @@ def test_a_plate_with_few_slips_answers_for_sliding():
     assert known.law.slope == pytest.approx(0.4, abs=0.05)
     assert known.law.trial_sd == pytest.approx(0.2, abs=0.12)
     assert known.law.spread == pytest.approx(0.1, abs=0.01)
-    # 1.6 N is half way: a risk, and never none for want of slips
+    # 1.6 N is half way: the risk is not 0 although no push slipped
     assert 0.1 < known.slip_risk(1.6, 4.0).risk < 0.9
     assert known.slip_risk(1.3, 4.0).risk > 0.001
 

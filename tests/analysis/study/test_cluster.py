@@ -126,7 +126,7 @@ def test_a_scheduler_on_this_machine_or_by_tls_is_accepted(address):
 
 @pytest.mark.long
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
-def test_a_missing_scheduler_is_named():
+def test_a_missing_scheduler_is_reported():
     address = f"tcp://127.0.0.1:{free_port()}"
     with pytest.raises(SettingsError, match=address):
         run_tasks(abs, [1, 2], Workers(scheduler=address))

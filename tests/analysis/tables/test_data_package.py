@@ -59,7 +59,7 @@ def test_the_descriptor_itself_names_the_package(tmp_path):
     assert list(load_tables([tmp_path / DESCRIPTOR])) == ["gravel"]
 
 
-def test_one_changed_digit_is_named(tmp_path):
+def test_one_changed_digit_is_reported(tmp_path):
     file = write_package(tmp_path)
     file.write_text(ROWS.replace("10,4.0", "10,5.0"))
     for path in (tmp_path, file):
@@ -67,14 +67,14 @@ def test_one_changed_digit_is_named(tmp_path):
             load_tables([path])
 
 
-def test_a_truncated_file_is_named_with_both_sizes(tmp_path):
+def test_a_truncated_file_is_reported_with_both_sizes(tmp_path):
     file = write_package(tmp_path)
     file.write_text(ROWS[:-5])
     with pytest.raises(SettingsError, match=f"{len(ROWS) - 5} bytes.*{len(ROWS)}"):
         load_tables([tmp_path])
 
 
-def test_a_missing_file_is_named(tmp_path):
+def test_a_missing_file_is_reported(tmp_path):
     write_package(tmp_path).unlink()
     with pytest.raises(SettingsError, match=r"T01\.csv"):
         load_tables([tmp_path])

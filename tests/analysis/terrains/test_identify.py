@@ -263,7 +263,7 @@ def test_interpolated_tables_are_close_to_the_model(study, path):
     assert np.abs(tabled.sd / exact.sd - 1.0).max() < 0.05
 
 
-def test_an_unknown_terrain_and_an_unknown_model_are_named(path):
+def test_an_unknown_terrain_and_an_unknown_model_are_reported(path):
     database = load(path)
     with pytest.raises(SettingsError, match="no terrain 'moon'"):
         database.terrain("moon")
@@ -305,7 +305,7 @@ def test_other_texts_are_refused(tmp_path, text):
         load(bad)
 
 
-def test_a_missing_file_is_named(tmp_path):
+def test_a_missing_file_is_reported(tmp_path):
     with pytest.raises(SettingsError, match="cannot be read"):
         load(tmp_path / "gone.json")
 

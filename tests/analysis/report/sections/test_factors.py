@@ -12,7 +12,7 @@ from analysis.report.sections.beyond_paper.factors import (
 
 
 def trial(ratio):
-    """Return a trial with nothing but forces of a ratio."""
+    """Return a stub of a trial with forces of a given ratio."""
     import numpy as np
 
     return SimpleNamespace(kept=1, F_n=np.full(3, 2.0), F_t=np.full(3, 2.0 * ratio))

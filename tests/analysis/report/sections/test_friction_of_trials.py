@@ -1,4 +1,4 @@
-"""The drag of a trial follows the calibration of friction recorded with it."""
+"""The drag of a trial is computed from the friction calibration recorded with it."""
 
 from dataclasses import replace
 
@@ -33,7 +33,7 @@ def trial(tmp_path_factory):
 
 
 def health(trial, share="0.0", **changes):
-    """Return the health of the trial as a simulated one that turned joint 2."""
+    """Return the health of a simulated trial that moved joint 2."""
     speeds = np.zeros((trial.t.size, 7))
     speeds[:, 1] = 0.1
     left = as_left(trial, velocity=speeds)
@@ -42,7 +42,7 @@ def health(trial, share="0.0", **changes):
     return row
 
 
-def test_a_trial_carries_the_calibration_that_was_recorded_with_it(trial):
+def test_a_trial_contains_the_calibration_recorded_with_it(trial):
     assert trial.friction_text == text()
 
 

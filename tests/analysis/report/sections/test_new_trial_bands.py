@@ -26,13 +26,13 @@ pytestmark = pytest.mark.slow  # a whole study
 
 
 def reach_of(others, nominal):
-    """Return the reach for one more trial, however large its own scores are."""
+    """Return the radius for a new trial, independent of its own scores."""
     return conformal_reaches([np.full(3, 1e6), *others], nominal)[0]
 
 
 def test_a_conformal_radius_has_one_weight_at_infinity():
     scores = [np.array([float(k)]) for k in range(1, 10)]  # nine trials
-    # the k-th smallest of nine is reached with a share of k/10
+    # the k-th smallest of nine scores covers a share of k/10
     assert reach_of(scores, 0.5) == 5.0
     assert reach_of(scores, 0.8) == 8.0
     assert reach_of(scores, 0.9) == 9.0

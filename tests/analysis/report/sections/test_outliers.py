@@ -1,4 +1,4 @@
-"""Trials that stand out are named with the reason, and no others."""
+"""Outlier trials are reported with the reason, other trials are not."""
 
 from dataclasses import replace
 
@@ -79,8 +79,8 @@ def test_several_trials_with_one_fault_do_not_mask_each_other():
 def test_the_scale_is_the_standard_deviation_of_normal_values():
     rng = np.random.default_rng(1)
     for count in (4, 9, 10, 31):
-        found = [qn_scale(rng.normal(5.0, 2.0, count)) for _ in range(2000)]
-        assert np.mean(found) == pytest.approx(2.0, rel=0.04), count
+        scales = [qn_scale(rng.normal(5.0, 2.0, count)) for _ in range(2000)]
+        assert np.mean(scales) == pytest.approx(2.0, rel=0.04), count
 
 
 def test_the_scale_is_robust_to_half_of_the_values():

@@ -97,7 +97,7 @@ def test_another_smoothing_is_compared_on_the_same_samples(make_series, moving):
     same = run_study(trials, smooth, simulated=True).terrains["S0"].mae(TUSTIN)
     own = replace(smooth, target=None)
     easier = run_study(trials, own, simulated=True).terrains["S0"].mae(TUSTIN)
-    # a target that is smoothed as much is easier: its noise is gone
+    # a smoothed target is easier to predict: its noise is removed
     assert same > 1.02 * easier
 
 
@@ -143,6 +143,6 @@ def test_results_of_both_studies_are_kept_with_their_difference(both):
     difference = plain["after"] - plain["before"]
     assert plain["paired"]["difference"] == pytest.approx(difference)
     assert plain["paired"]["trials"] == 3
-    # the made force has a static part that does not grow with the load
+    # the synthetic force has a static part that does not grow with the load
     assert difference > 0
     assert np.isfinite(plain["paired"]["p"])

@@ -69,7 +69,7 @@ def test_the_source_is_complete(target):
     assert source["terrains"]["S0"]["trials"] == 10
 
 
-def test_simulated_trials_are_named_in_every_artefact(target):
+def test_simulated_trials_are_reported_in_every_artefact(target):
     for path, content in target_files(target, export()).items():
         assert b"simulated" in content.lower(), path
     for path, content in target_files(target, export(is_simulated=False)).items():

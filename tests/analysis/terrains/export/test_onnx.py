@@ -64,7 +64,7 @@ def test_the_model_uses_few_operators_and_states_its_origin(folder):
     assert about["database_sha256"] == export().digest
 
 
-def test_without_onnx_the_extra_is_named(monkeypatch):
+def test_without_onnx_the_extra_is_reported(monkeypatch):
     monkeypatch.setitem(sys.modules, "onnx", None)
     with pytest.raises(MissingLibraryError, match=r"traction\[onnx\]"):
         target_files("onnx", export())
