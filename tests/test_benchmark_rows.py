@@ -20,11 +20,11 @@ from benchmarks.scale import exponent, folds_of, rows_of
         (BenchRow("x", None, "s", 2.0, note="not installed"), ""),
     ],
 )
-def test_a_row_says_whether_its_goal_is_met(row, verdict):
+def test_a_row_states_whether_its_goal_is_met(row, verdict):
     assert row.verdict == verdict
 
 
-def test_a_row_without_a_value_says_why():
+def test_a_row_without_a_value_states_why():
     what, today, goal, _ = BenchRow("x", None, "s", 2.0, note="no GPy").cells()
     assert (what, today, goal) == ("x (no GPy)", "-", "≤ 2 s")
 

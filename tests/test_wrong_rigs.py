@@ -1,4 +1,4 @@
-"""Every step of a commissioning finds a wrong rig, and every wrong rig is found."""
+"""Every commissioning step detects a faulty rig, and every faulty rig is detected."""
 
 import pytest
 
@@ -8,13 +8,13 @@ from fakes.world.wrong_rigs import catalogue
 from tests.attacks.parameters import parameters
 from tests.wrong_rigs import FOUND, REFUSED, WARNED, rig_attacks
 
-# Quantities that say how a step was done, not what the rig is like.
+# Quantities on the execution of a step, not on the rig.
 OF_THE_WORK = {
     *("listened", "answered", "cycles", "seen", "active", "rocked", "turned"),
     *("corners", "flat", "pressed", "pulled"),
 }
-# Judged on made recordings and held arms in tests/experiments/commissioning: a start
-# refuses the rig, another quantity is sooner, or rig.toml alone is wrong.
+# Tested with synthetic data and held arms in tests/experiments/commissioning: a start
+# refuses the rig, another quantity fails first, or only rig.toml is wrong.
 OF_RECORDINGS = {
     *("load", "drawings", "error_frames", "module", "serials"),
     *("late", "jumps", "answer", "stop", "stays", "idles", "asleep"),
@@ -33,18 +33,18 @@ OF_THE_DAY = {"changed", "exchange", "zero", "hang_force", "hang_way", "drift"}
 ROWS = [(name, finding) for name, row in FOUND.items() for finding in row]
 
 
-def test_every_rig_of_the_catalogue_has_a_finding():
+def test_every_rig_of_the_catalogue_is_in_the_table():
     assert set(FOUND) == set(catalogue())
     assert all(finding.by for _, finding in ROWS)
 
 
-def test_every_step_finds_a_wrong_rig():
+def test_every_step_detects_a_faulty_rig():
     assert {finding.step for _, finding in ROWS} == set(STEPS)
     judged = {finding.step for _, finding in ROWS if finding.by != (REFUSED,)}
     assert judged == set(STEPS)
 
 
-def test_every_quantity_finds_a_wrong_rig_or_is_tested_elsewhere():
+def test_every_quantity_detects_a_faulty_rig_or_is_tested_elsewhere():
     tripped = {key for _, finding in ROWS for key in finding.by} - {REFUSED, WARNED}
     assert tripped <= set(LIMITS)
     others = [OF_THE_WORK, OF_RECORDINGS, OF_THE_DAY]
@@ -53,5 +53,5 @@ def test_every_quantity_finds_a_wrong_rig_or_is_tested_elsewhere():
 
 
 @pytest.mark.parametrize("row", parameters(rig_attacks()))
-def test_a_wrong_rig_is_found_as_listed_in_the_table(row, tmp_path):
+def test_a_faulty_rig_is_detected_as_listed_in_the_table(row, tmp_path):
     row.check(tmp_path)

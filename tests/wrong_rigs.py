@@ -1,10 +1,10 @@
-"""Which step of `traction commission` finds which wrong rig, by which quantity.
+"""Table of the commissioning step and quantity that detect each faulty rig.
 
 `FOUND` is the table. Each rig of the catalogue is commissioned by the scripted operator
 in stepped time, in its own folder, with a container of full length, from a step that
-needs nothing of the steps before. The motion before the finding is read from the
-recordings of C8 to C11: energy of the arm, speed and travel of the sole, by the
-positions as reported.
+does not depend on earlier ones. The motion before the detection is taken from the
+recordings of C8 to C11: energy of the arm, speed and travel of the sole, computed from
+the reported positions.
 """
 
 import re
@@ -33,12 +33,12 @@ from tests.experiments.program import traction, write_config
 from wam.model.arm_model import ArmModel
 from wam.model.constants import load_constants
 
-# Bounds of the motion before a finding: the guard's own bound in a powered test, the
+# Bounds of the motion before the detection: the guard's bound in a powered test, the
 # travel of a lift, and a slow hand.
 MAX_ENERGY, MAX_TRAVEL, MAX_SPEED = 0.070, 0.025, 0.2  # J, m, m/s
 SEED, FRICTION = 1, 0.7
 _SOUND_SEEDS, _SHARES = range(1, 41), (0.4, 0.7, 1.0)
-_SPEED_OVER = 10  # cycles, over which a speed is taken
+_SPEED_OVER = 10  # cycles over which a speed is computed
 _TRAVEL = 0.45  # m, of a container whose corners can be distinguished
 REFUSED, WARNED = "no judgement", "a note"
 _QUICK = {StepId.CONFIGURATION, StepId.LISTEN, StepId.IDENTITY}
@@ -46,11 +46,11 @@ _QUICK = {StepId.CONFIGURATION, StepId.LISTEN, StepId.IDENTITY}
 
 @dataclass(frozen=True)
 class Finding:
-    """A step that finds a wrong rig.
+    """A step that detects a faulty rig.
 
     Attributes:
-        step: step that finds the rig.
-        by: quantities of `judging.LIMITS` that are beyond their limits then; REFUSED =
+        step: step that detects the fault.
+        by: quantities of `judging.LIMITS` that exceed their limits; REFUSED =
             the step ends without a judgement; WARNED = the step passes with a note.
         first: step to begin with; "" = the same.
     """

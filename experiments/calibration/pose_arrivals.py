@@ -10,7 +10,7 @@ from wam.calibration.poses import MeasurementPose
 
 @dataclass(frozen=True, slots=True)
 class Arrival:
-    """The arm stands at a halt.
+    """The arm has come to rest at a halt.
 
     Attributes:
         halt: the halt.

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from wam.bus.error_frames import BusErrors
 
 EXAMPLES = """\
-  traction check --bus 10                   who says what on the bus; nothing is sent
+  traction check --bus 10                   print the bus traffic; nothing is sent
   traction check --fake --json > page.json  the page with simulated devices, as JSON"""
 
 _JSON_SCHEMA = 1

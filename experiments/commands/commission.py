@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from experiments.settings.matrix import TerrainRow
 
 EXAMPLES = """\
-  traction commission --config lab/rig.toml what is not done or stale, step by step
+  traction commission --config lab/rig.toml the missing and stale steps in turn
   traction commission --fake --fast --until C3    the first steps, simulated devices"""
 
 FAKE_FOLDER = "commissioning.fake"

@@ -95,7 +95,7 @@ def _report(args: argparse.Namespace) -> None:
         return
     missing = report_missing(sessions, console, allow_missing=args.allow_missing)
     page = report_sessions(sessions, data, replace(wanted, missing=missing), console)
-    if not missing and not _left_out(page):  # what is incomplete is said every time
+    if not missing and not _left_out(page):  # report missing data every time
         record.write()
     if args.json:
         names = [session.id for session in sessions]

@@ -85,7 +85,7 @@ HandOrder = PoseOrder | StopOrder | HangOrder | PushOrder | TwistOrder | Release
 
 
 class HandOrderError(ValueError):
-    """A malformed order to the hands; its text says why."""
+    """A malformed command to the hands; its text states the reason."""
 
 
 def parse_hand_order(words: list[str]) -> HandOrder | None:

@@ -50,7 +50,7 @@ class TimedPress:
 
 
 class OrderError(ValueError):
-    """A line that is no order; its text says why."""
+    """A line that is no command; its text states the reason."""
 
 
 def parse_order(words: list[str]) -> Order:

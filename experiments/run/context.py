@@ -133,7 +133,7 @@ class RunServices:
         return FootKeys(self.loop_client, is_wanted=is_wanted)
 
     def append(self, event: Event, **details: object) -> None:
-        """Append an event to the journal while the console's heartbeat goes on.
+        """Append an event to the journal while the console keeps its heartbeat.
 
         The console keeps watching the arm even if the disk is slow.
 

@@ -153,7 +153,7 @@ def _pause(context: RunContext, name: TrialName) -> None:
                 pass
             is_over = True
         except ArmFaultError as fault:
-            context.clear_faults(fault)  # the pause goes on
+            context.clear_faults(fault)  # the pause continues
     context.state.fault_context = before
     context.append(Event.CONTINUED)
     context.await_trial()

@@ -130,7 +130,7 @@ class EndDetector:
     crossed_at: float | None = None
 
     def reason(self, elapsed: float, displacement: float) -> str:
-        """Return the reason to end the trial now, "" while it goes on."""
+        """Return the reason to end the trial now, "" while it continues."""
         if self.crossed_at is None and displacement >= self.travel:
             self.crossed_at = elapsed
         if self.crossed_at is not None and elapsed >= self.crossed_at + AFTER_TRAVEL:

@@ -128,15 +128,15 @@ class JointGrip:
         """Whether the path has ended; the joints are held there."""
         return self._way.is_done
 
-    def step(self, q: Array, bears: Array) -> GripTorques:
+    def step(self, q: Array, support: Array) -> GripTorques:
         """Return the torques of the hands in a cycle.
 
         Args:
             q: joint positions [rad], shape (7,).
-            bears: torques that support the remaining weight [N m], shape (7,).
+            support: torques against the remaining weight [N m], shape (7,).
         """
         if not self._has_begun:
             self._way.begin(q)
             self._has_begun = True
         wanted, rates = self._way.advance(q)
-        return GripTorques(bears + _B * rates, _K, _B, wanted.copy(), _STRONGEST)
+        return GripTorques(support + _B * rates, _K, _B, wanted.copy(), _STRONGEST)

@@ -14,7 +14,7 @@ _MAX_STAGGER_NS = 75_000
 
 
 class Power(Enum):
-    """What a puck's processor is doing."""
+    """State of a puck's processor."""
 
     OFF = "no power"
     MONITOR = "asleep"

@@ -34,7 +34,7 @@ _SENSOR_WORDS = {1: "sensor not detected", 2: "sensor failure", 4: "temperature 
 
 @dataclass(frozen=True, slots=True)
 class OptoForceFrame:
-    """One measurement as it was on the wire.
+    """One measurement as transmitted.
 
     Attributes:
         counter: frame counter, wraps at 65536.

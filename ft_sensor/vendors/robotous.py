@@ -65,7 +65,7 @@ MODELS = {
 
 @dataclass(frozen=True, slots=True)
 class RobotousFrame:
-    """One measurement as it was on the wire.
+    """One measurement as transmitted.
 
     Attributes:
         counts: fx fy fz tx ty tz as sent, 16 bits each.

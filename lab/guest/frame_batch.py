@@ -47,7 +47,7 @@ def open_can(channel: str) -> socket.socket:
 
 
 class FrameBatch:
-    """A raw CAN socket whose frames lie in shared memory.
+    """A raw CAN socket whose frames are in shared memory.
 
     Attributes:
         lost: frames not accepted by the bus, as without an acknowledging node.

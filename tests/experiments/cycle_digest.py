@@ -1,6 +1,6 @@
 """Digests of the cycles that one seed of the simulation records.
 
-`python -m tests.experiments.cycle_digest` writes them anew after a change that is meant
+`python -m tests.experiments.cycle_digest` rewrites them after a change that is meant
 to alter the simulation, the control law or the layout of a cycle; with the name of a
 folder it records there and prints them.
 """
@@ -65,7 +65,7 @@ def record(folder: Path) -> Path:
 
 
 def main() -> None:
-    """Write the digests of the simulation anew, or print those of this process."""
+    """Rewrite the digests of the simulation, or print those of this process."""
     if len(sys.argv) > 1:
         result = {
             "processor": processor(),

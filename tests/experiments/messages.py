@@ -1,4 +1,4 @@
-"""The catalogue of messages, as patterns of what the screen shows."""
+"""The catalogue of messages, as patterns of the screen's text."""
 
 import re
 from string import Formatter

@@ -22,7 +22,7 @@ TRAVEL = 0.07  # m, a container that is crossed in a few seconds
 
 @dataclass(frozen=True)
 class Done:
-    """How a command ended, and what it printed."""
+    """Exit code and output of a command."""
 
     code: int
     out: str

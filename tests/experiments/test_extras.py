@@ -60,7 +60,7 @@ def foreign_modules():
 
 
 def without(names, *arguments):
-    """Run a command where `names` cannot be imported; the ended process."""
+    """Run a command with `names` not importable; return the finished process."""
     code = HIDDEN.format(names=names, arguments=[str(word) for word in arguments])
     words = [sys.executable, "-c", code]
     return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
@@ -77,7 +77,7 @@ def test_extras_are_those_of_the_distribution():
 
 
 @pytest.mark.parametrize("extra", EXTRAS)
-def test_an_extra_whose_library_is_hidden_is_named(extra, monkeypatch):
+def test_an_extra_whose_library_is_hidden_is_reported(extra, monkeypatch):
     require_extra(extra)
     hidden = next(iter(EXTRAS[extra]))
     monkeypatch.setitem(sys.modules, hidden, None)

@@ -98,7 +98,7 @@ LOAD = ComputerLoad(8.7, 2)
 SILENCE = verdict_for(Fault.CAN_SILENCE, ReplySilence(10.0, 0x7F))
 
 
-def test_a_busy_computer_is_named_first_and_no_cable_is_blamed():
+def test_a_busy_computer_is_reported_first_and_no_cable_is_blamed():
     text = fault_text(SILENCE, FaultContext("T03", 1.5, load=LOAD))
     assert text.startswith(
         "This computer is too busy to simulate on the wall clock (load 8.7, cores 2)."
@@ -109,7 +109,7 @@ def test_a_busy_computer_is_named_first_and_no_cable_is_blamed():
     assert "cable" not in text
 
 
-def test_without_a_busy_computer_the_cable_is_named():
+def test_without_a_busy_computer_the_cable_is_reported():
     text = fault_text(SILENCE, FaultContext("T03", 1.5))
     assert "busy" not in text
     assert "Check the CAN cable" in text
@@ -132,7 +132,7 @@ def test_a_refusal_names_a_busy_computer_instead_of_cables():
     assert "cable" not in refusal.hint
 
 
-def test_the_type_of_a_refusal_says_whether_a_device_is_unfit():
+def test_the_type_of_a_refusal_states_whether_a_device_is_unfit():
     lost = {"lost": 60, "cycles": 100}
     assert isinstance(preflight_error("exchange", **lost), UnfitDeviceError)
     assert not isinstance(preflight_error("loop-dead"), UnfitDeviceError)

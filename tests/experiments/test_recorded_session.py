@@ -13,7 +13,7 @@ from tests.experiments.cycle_digest import KEPT, digests_in_process
 from tests.experiments.program import journal, only_session, traction
 
 RECORDED = Path(__file__).parents[1] / "data" / "recorded"
-# Two trials of three on TF; the configuration lies in the folder of the session.
+# Two trials of three on TF; the configuration is in the folder of the session.
 SESSION = RECORDED / "session-1.0.tar.xz"
 
 

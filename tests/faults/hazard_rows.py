@@ -270,7 +270,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (
                 _MATRIX,
                 "tests/ft_sensor/vendors/test_sensor_contract.py::test_one_frozen_reading_is_invalid_until_it_changes",
-                "tests/experiments/run/test_quality.py::test_a_frozen_channel_is_named_and_the_sensor_is_not_ticked",
+                "tests/experiments/run/test_quality.py::test_a_frozen_channel_is_reported_and_the_sensor_is_marked_unreliable",
             ),
         ),
         "drifting": (

@@ -1,6 +1,6 @@
 """Hazards as data: every signal and every kind of its fault.
 
-`python -m tests.faults` prints it; what is measured comes from bounds.json.
+`python -m tests.faults` prints it; measured values come from bounds.json.
 """
 
 from dataclasses import dataclass
@@ -19,11 +19,11 @@ For every signal: the hazard when it is lost, stuck, drifting, implausible or la
 it is detected, the reaction, the bound until then, and the test. Bounds are the worst
 of the recording of a trial and of a move by the arm itself, measured on the simulated
 arm: largest joint speed as a share of the joint's limit, travel of the sole within
-0.5 s, force of the motors on the person who holds the sole. "As without it" stands
-where that is not more than what is measured when nothing happens at all.
+0.5 s, force of the motors on the person who holds the sole. "As without it" means that
+the value does not exceed the one without a fault.
 """
 _S = StepId
-# Steps of `traction commission` by the signal that they prove sound on the arm at hand.
+# Steps of `traction commission` by the signal that they verify on the real arm.
 PROOFS: dict[str, tuple[StepId, ...]] = {
     "joint position": (_S.IDENTITY, _S.TIMING, _S.BY_HAND),
     "joint torque command": (_S.IDENTITY, _S.RAMPS, _S.LIFT, _S.GRAVITY_RAMP),

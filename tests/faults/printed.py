@@ -10,15 +10,15 @@ from tests.faults.truth import Promise, promise_of
 TRUTH = """
 ## True motion of the arm
 
-Taken from the simulated arm itself, not from what the driver believes: from the fault
+Taken from the simulated arm, not from the driver's estimate: from the fault
 to half a second after the command. `speed` is the largest joint speed as a share of the
-joint's limit in rig.toml, with the joint; `travel` how far the sole gets within 0.5 s;
-`drive` the force that the motors, beyond the arm's weight, put on the person who
+joint's limit in rig.toml, with the joint; `travel` the travel of the sole within 0.5 s;
+`drive` the force of the motors, beyond gravity compensation, on the person who
 holds the sole; `hand` the force between arm and hand; `sole` its largest speed within
-0.5 s. `idle` is when the arm went idle, `rest` when the sole began to stand for 0.1 s
+0.5 s. `idle` is when the arm went idle, `rest` when the sole came to rest for 0.1 s
 (3 cm/s), both counted from the fault; - = not within 3 s. No cell may exceed speed 1,
-travel 160 mm (100 mm where the fault stops the arm), drive 50 N and hand 80 N, but
-where a note says so. Measured by `python -m tests.faults.bounds`.
+travel 160 mm (100 mm if the fault stops the arm), drive 50 N and hand 80 N, unless
+a note says so. Measured by `python -m tests.faults.bounds`.
 """
 
 

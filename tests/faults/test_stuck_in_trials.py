@@ -49,7 +49,7 @@ def test_a_sound_arm_completes_a_trial_with_any_friction(config, tmp_path, frict
 def test_a_frozen_motor_that_hardly_turns_moves_the_arm_within_bounds(
     config, tmp_path, motor
 ):
-    """The fault is not detected: neither bears weight, and both may rest in a trial.
+    """The fault is not detected: neither carries weight, and both may rest in a trial.
 
     The lock does not detect that joint 7 turns, so the ground turns the foot.
     """

@@ -19,8 +19,8 @@ def double(rng: random.Random, data: bytearray) -> None:
 def damaged_stream(make, encode, fault, seed):
     """Return (bytes, frames, numbers of the damaged ones) of 150 frames, 30 damaged.
 
-    Damaged frames are never neighbours: the last byte of one could then stand in for
-    the lost header of the next, which is a recovery and no loss.
+    Damaged frames are never adjacent: the last byte of one could replace the lost
+    header of the next, so that no frame is lost.
     """
     rng = random.Random(seed)
     sent = [make(rng, number) for number in range(150)]

@@ -11,7 +11,7 @@ from lab.requirements import LabError, install_line, missing_packages
 from lab.results import ScenarioResult, Verdict
 
 
-def test_missing_programs_are_named_once_by_their_packages():
+def test_missing_programs_are_reported_once_by_their_packages():
     absent = {"modprobe", "depmod", "qemu-system-x86_64"}
     packages = missing_packages(lambda name: None if name in absent else f"/bin/{name}")
     assert packages == ["kmod", "qemu-system-x86"]

@@ -63,7 +63,7 @@ def test_a_timer_reported_by_the_machine_is_corrected():
 
 
 @pytest.mark.parametrize("is_hanging", [True, False])
-def test_the_scenario_during_which_a_machine_is_lost_is_named(is_hanging):
+def test_the_scenario_during_which_a_machine_is_lost_is_reported(is_hanging):
     lines = [
         to_line(ScenarioStarted("bench")),
         to_line(SENT),

@@ -44,7 +44,7 @@ def last_cycle_ns(seen):
     (folder,) = seen.data.glob("sessions/*.fake")
     whole = [*folder.glob("trials/T*.mcap"), *folder.glob("rejected/T*.mcap")]
     whole = [path for path in whole if "truth" not in path.name]
-    # Of a trial that a stall ended, and that was begun anew, the last attempt counts.
+    # If a stall ended a trial that was then repeated, the last attempt counts.
     path = max(whole or folder.glob("trials/*.partial"), key=lambda path: path.stem)
     last = None
     with path.open("rb") as stream, contextlib.suppress(McapError):

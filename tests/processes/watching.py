@@ -1,4 +1,4 @@
-"""A session in processes, seen from outside: its processes, the state of the arm."""
+"""Observation of a session in processes: its processes and the state of the arm."""
 
 import json
 import os
@@ -85,7 +85,7 @@ def is_stalled(text):
 
 
 class Session:
-    """A `traction run --fake` in a process of its own."""
+    """A `traction run --fake` in a separate process."""
 
     def __init__(self, process, data):
         self.process = process

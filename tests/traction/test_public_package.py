@@ -106,7 +106,7 @@ def test_one_table_is_a_trial_and_a_folder_is_not(workplace):
 
 
 @pytest.mark.parametrize("name", ["nothing.mcap", "nothing.csv", "nothing"])
-def test_a_missing_file_is_named(name):
+def test_a_missing_file_is_reported(name):
     with pytest.raises(TractionError, match=name):
         tr.load_trial(name)
 
@@ -149,7 +149,7 @@ def test_a_frame_of_a_session_names_trial_and_terrain(session, kept):
     assert set(frame["terrain"]) == {"TF"}
 
 
-def test_without_pandas_the_extra_is_named(session, monkeypatch):
+def test_without_pandas_the_extra_is_reported(session, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(SettingsError, match=r"traction\[pandas\]"):
         session[0].to_pandas()
@@ -255,7 +255,7 @@ def test_a_model_of_several_terrains_is_refused(session, tmp_path):
         tr.fit([*session, *other], "tustin")
 
 
-def test_a_missing_terrain_database_is_named(tmp_path):
+def test_a_missing_terrain_database_is_reported(tmp_path):
     with pytest.raises(SettingsError, match=r"terrains\.json"):
         tr.load_terrains(tmp_path / "terrains.json")
 
@@ -284,7 +284,7 @@ def test_the_package_is_imported_without_a_slow_library(tmp_path):
 
 @pytest.mark.parametrize("name", ["analysis", "experiments", "wam"])
 @pytest.mark.parametrize("is_package", [True, False])
-def test_a_folder_that_hides_a_package_is_named(tmp_path, name, is_package):
+def test_a_folder_that_hides_a_package_is_reported(tmp_path, name, is_package):
     (tmp_path / name).mkdir()
     if is_package:
         (tmp_path / name / "__init__.py").write_text("")
@@ -295,7 +295,7 @@ def test_a_folder_that_hides_a_package_is_named(tmp_path, name, is_package):
     assert str(ROOT / name) in last
 
 
-def test_a_module_that_hides_a_package_is_named(tmp_path):
+def test_a_module_that_hides_a_package_is_reported(tmp_path):
     (tmp_path / "analysis.py").write_text("x = 1\n")
     done = python("-c", "import traction as tr; tr.fit", cwd=tmp_path)
     assert f"{tmp_path / 'analysis.py'} hides" in done.stderr

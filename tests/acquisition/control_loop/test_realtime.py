@@ -26,7 +26,7 @@ def granting(monkeypatch):
     return asked
 
 
-def test_a_refused_kernel_request_is_named_with_its_requirement(refusing):
+def test_a_refused_kernel_request_is_reported_with_its_requirement(refusing):
     grants = request(RealtimeRequest(priority=80, core=1, nice=5))
     assert [grant.is_granted for grant in grants] == [False] * 3
     assert [grant.what for grant in grants] == ["core 1", "SCHED_FIFO", "nice 5"]
@@ -77,7 +77,7 @@ def test_an_open_descriptor_keeps_processors_awake(tmp_path, monkeypatch):
     os.close(descriptor)
 
 
-def test_a_refused_sleep_inhibition_is_named_with_its_requirement(monkeypatch):
+def test_a_refused_sleep_inhibition_is_reported_with_its_requirement(monkeypatch):
     def refuse(*_):
         raise OSError(errno.EACCES, "Permission denied")
 

@@ -135,7 +135,7 @@ def test_a_child_inherits_nothing_but_what_it_needs(child):
     assert child.ask(IsSessionLeader())
 
 
-def test_a_killed_child_is_named_with_its_signal(child):
+def test_a_killed_child_is_reported_with_its_signal(child):
     os.kill(child.pid, signal.SIGKILL)
     with pytest.raises(ProcessLostError, match="helper process ended: killed by SIGKI"):
         child.ask(AddNumbers(1, 1))

@@ -83,7 +83,7 @@ def test_two_magics_alone_are_not_a_trial(put):
         TrialReader(put(b"\x89MCAP0\r\n" * 2))
 
 
-def test_a_missing_file_is_named(tmp_path):
+def test_a_missing_file_is_reported(tmp_path):
     with pytest.raises(TrialFileError, match=r"T99\.mcap"):
         TrialReader(tmp_path / "T99.mcap")
 

@@ -196,7 +196,7 @@ def test_the_file_names_the_foot_that_was_fitted(calibrated):
     assert found.poses.shape == found.torques.shape == (3, 7)
 
 
-def test_a_missing_calibration_is_named(tmp_path):
+def test_a_missing_calibration_is_reported(tmp_path):
     use = ('model = "cad"', 'model = "calibrated"')
     config = write_config(tmp_path, rig=use)
     for options in (("--fake", "--fast"), ("--config-only",)):
@@ -287,7 +287,7 @@ def test_the_estimate_of_zero_errors_is_printed(calibrated):
 
 
 def test_a_calibration_with_a_hand_on_the_foot_is_refused(tmp_path):
-    """Somebody leans on the foot from the second pose on; the torques look perfect."""
+    """A person leans on the foot from the second pose on; the torques look normal."""
     lean = (0.0, 3.0, -4.0)  # N
 
     def press(asked, rig):

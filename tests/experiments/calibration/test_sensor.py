@@ -256,12 +256,12 @@ def test_a_calibration_of_another_foot_is_refused(tmp_path, calibrated):
         ("x = [" * 3000, "not a calibration of a wrist sensor"),
     ],
 )
-def test_an_invalid_calibration_file_is_named(text, cause):
+def test_an_invalid_calibration_file_is_reported(text, cause):
     with pytest.raises(SettingsError, match=cause):
         sensor_from_toml(text, "ft_sensor.toml")
 
 
-def test_a_missing_calibration_is_named_with_what_to_do(tmp_path):
+def test_a_missing_calibration_is_reported_with_what_to_do(tmp_path):
     change = ("sign = 1 ", 'calibration = "gone.toml"\nsign = 1 ')
     config = write_config(tmp_path, rig=change)
     done = run_short(config, tmp_path / "data")

@@ -72,7 +72,7 @@ def test_a_data_folder_that_is_a_file_is_refused(config, tmp_path, below):
         ("redo 6", "line 2: 'redo 6' - expected keep, redo 1..5 or quit;"),
     ],
 )
-def test_a_bad_line_of_an_operator_script_is_named(config, tmp_path, line, text):
+def test_a_bad_line_of_an_operator_script_is_reported(config, tmp_path, line, text):
     script = tmp_path / "script.txt"
     script.write_text(f"keep\n{line}\n")
     done = run_short(config, tmp_path / "data", "TF", 1, "--operator-script", script)
@@ -198,13 +198,13 @@ SETTINGS = [
 
 
 @pytest.mark.parametrize(("name", "change", "text"), SETTINGS)
-def test_a_wrong_setting_is_named_with_what_to_write(tmp_path, name, change, text):
+def test_a_wrong_setting_is_reported_with_what_to_write(tmp_path, name, change, text):
     config = write_config(tmp_path, **{name: change})
     done = traction("status", "--config", config, "--data", tmp_path)
     assert refusal(done).startswith(text)
 
 
-def test_every_wrong_setting_is_named_with_its_line(tmp_path):
+def test_every_wrong_setting_is_reported_with_its_line(tmp_path):
     config = write_config(tmp_path, rig=("bitrate", "bitrtae"))
     text = config.read_text().replace("foot_speed = 0.8", 'foot_speed = "fast"')
     text = text.replace("[operator]", "[operater]")
@@ -350,7 +350,7 @@ def test_an_invalid_seed_is_a_usage_error(tmp_path, seed):
     assert "expected a whole number >= 0, e.g. 1" in done.err.splitlines()[-1]
 
 
-def test_a_damaged_sidecar_is_named_and_its_trial_counts(copied, config):
+def test_a_damaged_sidecar_is_reported_and_its_trial_counts(copied, config):
     for path in only_session(copied).glob("trials/T0?.json"):
         path.write_bytes(b"[" * 100_000)
     done = traction("status", "--json", "--data", copied, "--config", config)

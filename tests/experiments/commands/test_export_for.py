@@ -76,7 +76,7 @@ def test_mixed_and_unknown_uses_are_refused(db, tmp_path, options, words):
     assert not (tmp_path / "made").exists()
 
 
-def test_missing_options_and_an_unreadable_database_are_named(db, tmp_path):
+def test_missing_options_and_an_unreadable_database_are_reported(db, tmp_path):
     done = traction("export", "--for", "c", "--to", tmp_path / "made")
     assert (done.code, "needs the database" in done.err) == (2, True)
     done = traction("export", "--for", "c", "--terrain-db", db)

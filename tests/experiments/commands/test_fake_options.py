@@ -99,7 +99,7 @@ def test_an_invalid_foot_file_starts_nothing(tmp_path, content, word):
     assert not (tmp_path / "bus").exists()
 
 
-def test_a_missing_foot_file_is_named(tmp_path):
+def test_a_missing_foot_file_is_reported(tmp_path):
     done = traction("fake", "--can", f"traction-fake:{tmp_path}/b", "--tool", "plough")
     assert done.code == 2
     assert "plough cannot be read" in done.err

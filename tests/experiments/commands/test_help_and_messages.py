@@ -123,7 +123,7 @@ class SimulatedScene:
         return only_session(self.data)
 
     def watch(self, press=None):
-        """Record what is built; `press(asked, scene)` goes before `hurry`."""
+        """Record the built objects; `press(asked, scene)` precedes `hurry`."""
         self.built = watch_builds(self.patch)
         usual = AutoOperator.answer
 
@@ -348,7 +348,7 @@ def _pull_in_vain(scene):
 
 
 def _stand_still(scene):
-    """Make any travel of motor 1 too far for an arm that stands still."""
+    """Make any travel of motor 1 exceed the limit of an arm at rest."""
     cycle = scene.built.cycle
     cycle.limits = replace(cycle.limits, still_travel=(1e-4, *[1.0] * 6))
 

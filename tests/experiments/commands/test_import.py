@@ -149,7 +149,7 @@ def test_an_invalid_option_is_refused_and_nothing_is_written(
     assert not (tmp_path / "out").exists()
 
 
-def test_missing_options_are_named(given, tmp_path):
+def test_missing_options_are_reported(given, tmp_path):
     done = traction("import", given[0], "--to", tmp_path / "out")
     assert done.code == 2
     needed = "--urdf, --foot, --sensor, --acts, --tare, --tool-mass, --along, --normal"

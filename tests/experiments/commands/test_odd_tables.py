@@ -1,4 +1,4 @@
-"""The report names what it cannot do with deficient tables, and does the rest."""
+"""The report states what deficient tables do not allow, and computes the rest."""
 
 import json
 import re

@@ -41,7 +41,7 @@ def folder(tmp_path, left):
     return tmp_path / "S012"
 
 
-def test_recover_says_what_was_saved_and_lost(folder):
+def test_recover_reports_what_was_saved_and_lost(folder):
     done = traction("recover", folder / "trials" / "T07.mcap.partial")
     assert done.code == 0
     assert "saved 0.50 s, 250 cycles, 351 messages -> T07.recovered.mcap" in done.out
@@ -59,7 +59,7 @@ def test_recover_of_a_folder_recovers_its_partial_files(folder):
     assert "2 files: 1 done, 1 not." in done.out
 
 
-def test_a_file_with_nothing_to_save_is_named_and_others_are_recovered(folder):
+def test_a_file_with_nothing_to_save_is_reported_and_others_are_recovered(folder):
     done = traction("recover", *sorted((folder / "trials").glob("*.partial"))[::-1])
     assert done.code == 6
     assert "T08.mcap.partial: has nothing to save" in done.err
@@ -84,7 +84,7 @@ def test_a_complete_trial_needs_no_recovery(folder):
     assert "is complete, nothing to recover (0.20 s, 100 cycles" in done.out
 
 
-def test_a_second_recovery_says_that_the_file_was_recovered_before(folder):
+def test_a_second_recovery_reports_that_the_file_was_recovered_before(folder):
     path = folder / "trials" / "T07.mcap.partial"
     traction("recover", path)
     done = traction("recover", path)
@@ -175,7 +175,7 @@ def with_damaged_attachment(folder, name):
     return path
 
 
-def test_a_lost_attachment_is_named(folder):
+def test_a_lost_attachment_is_reported(folder):
     path = with_damaged_attachment(folder, "config.toml")
     done = traction("recover", path)
     assert "Lost: config.toml, which no file beside it holds." in done.out
@@ -252,7 +252,7 @@ def test_a_file_rewritten_without_its_attachments_is_not_called_saved(
     assert again["attachments_missing"] == ["terrain.toml"]
 
 
-def test_a_missing_attachment_that_the_analysis_does_not_need_is_named(
+def test_a_missing_attachment_that_the_analysis_does_not_need_is_reported(
     folder, tmp_path
 ):
     whole = tmp_path / "T10.mcap"

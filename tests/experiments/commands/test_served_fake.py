@@ -213,7 +213,7 @@ def test_a_log_is_never_written_over_a_file(config, tmp_path):
     assert log.read_text() == "precious"
 
 
-def test_malformed_lines_of_a_log_are_named(tmp_path):
+def test_malformed_lines_of_a_log_are_reported(tmp_path):
     log = tmp_path / "bus.log"
     asked = "(1.000000) can0 404#30\n"
     log.write_text(f"\ufeff{asked}\x00\x01nonsense\n(2.12345678) can0 404#30\ncut (16")

@@ -1,4 +1,4 @@
-"""Status names the sessions that its table leaves out, and says why it is empty."""
+"""Status lists the sessions omitted from its table, and why a table is empty."""
 
 import json
 import shutil
@@ -27,7 +27,7 @@ def test_a_complete_status_table_has_no_remarks(config, data):
     assert status(config, data).err == ""
 
 
-def test_a_data_folder_that_does_not_exist_is_named(config, tmp_path):
+def test_a_data_folder_that_does_not_exist_is_reported(config, tmp_path):
     done = traction("status", "--config", config, "--data", tmp_path / "typo")
     assert done.code == 2
     assert f"no data folder {tmp_path / 'typo'}" in done.err
@@ -63,7 +63,7 @@ def test_a_condition_that_matches_nothing_is_reported(config, data):
     assert json.loads(done.out) == []
 
 
-def test_resume_says_that_the_session_is_open_elsewhere(tmp_path):
+def test_resume_reports_that_the_session_is_open_elsewhere(tmp_path):
     folder = create_session(tmp_path, "TF", is_simulated=True, utc_ns=0)
     with session_lock(folder):
         done = traction("resume", "--data", tmp_path)

@@ -1,4 +1,4 @@
-"""The program as a process of its own, and its report."""
+"""The program in a separate process, and its report."""
 
 import json
 import signal

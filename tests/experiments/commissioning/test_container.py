@@ -39,14 +39,14 @@ def test_a_container_as_typed_passes(frame):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"incline": np.radians(5.0)}, "Incline typed wrong"),
-        ({"incline": np.radians(-20.0)}, "Incline typed wrong"),
-        ({"heading": np.radians(20.0)}, "Heading typed wrong"),
-        ({"far_end": np.array([0.0, 0.0, -0.1])}, "far_end typed wrong"),
+        ({"incline": np.radians(5.0)}, "Wrong incline"),
+        ({"incline": np.radians(-20.0)}, "Wrong incline"),
+        ({"heading": np.radians(20.0)}, "Wrong heading"),
+        ({"far_end": np.array([0.0, 0.0, -0.1])}, "Wrong far_end"),
         ({"travel": -0.1}, "travel is longer than the container"),
     ],
 )
-def test_a_wrong_entry_is_named(frame, changes, words):
+def test_a_wrong_entry_is_reported(frame, changes, words):
     was = {name: np.add(getattr(frame, name), by) for name, by in changes.items()}
     true = replace(frame, **was)
     assert words in container.judge(touched(true, frame)).cause
@@ -58,13 +58,13 @@ def test_headings_are_compared_across_half_a_turn(frame):
     assert container.judge(touched(true, typed)).cause == ""
 
 
-def test_corners_that_make_no_container_are_named(frame):
+def test_corners_that_make_no_container_are_reported(frame):
     values = touched(frame, frame)
     values["points"][1] = values["points"][0]
     assert "corners are too close" in container.judge(values).cause
 
 
-def test_points_off_a_plane_are_named(frame):
+def test_points_off_a_plane_are_reported(frame):
     values = touched(frame, frame)
     values["points"][0, 2] += 0.03
     assert "points off the plane" in container.judge(values).cause

@@ -103,19 +103,19 @@ def test_many_sound_arms_pass_on_another_day(tool):
 @pytest.mark.parametrize(
     "seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))]
 )
-def test_a_change_of_the_arm_is_named(tool, seed, wrong, words):
+def test_a_change_of_the_arm_is_reported(tool, seed, wrong, words):
     assert daily.judge(day(tool, seed, wrong)).cause.startswith(words)
 
 
 @pytest.mark.parametrize(
     ("torques", "joint"), [((15.2, 7.0), 2), ((22.0, 7.0), 2), ((18.0, 5.5), 4)]
 )
-def test_a_changed_lift_off_torque_is_named(tool, torques, joint):
+def test_a_changed_lift_off_torque_is_reported(tool, torques, joint):
     cause = daily.judge(day(tool, 1, torques=torques)).cause
     assert cause.startswith(f"lift-off of joint {joint} over that of the commissioning")
 
 
-def test_a_joint_that_is_lifted_by_less_than_its_weight_is_named(tool):
+def test_a_joint_that_is_lifted_by_less_than_its_weight_is_reported(tool):
     cause = daily.judge(day(tool, 1, torques=(2.8, 7.0))).cause
     assert cause.startswith("lift-off of joint 2 over its weight")
 
@@ -132,11 +132,11 @@ def test_a_joint_that_is_lifted_by_less_than_its_weight_is_named(tool):
         ({"zero": np.radians([0.0, 1.8, 0, 0, 0, 0, 0])}, "zeroed elsewhere"),
     ],
 )
-def test_a_fault_of_the_bus_or_a_changed_zero_is_named(tool, changed, words):
+def test_a_fault_of_the_bus_or_a_changed_zero_is_reported(tool, changed, words):
     assert words in daily.judge(day(tool, 1, **changed)).cause
 
 
-def test_an_arm_that_moves_without_torque_is_named_and_not_lifted(tool):
+def test_an_arm_that_moves_without_torque_is_reported_and_not_lifted(tool):
     values = {k: v for k, v in day(tool, 1).items() if not k.startswith("ramp_")}
     values["rest_q"] = values["rest_q"].copy()
     values["rest_q"][-1, 1] += 0.016

@@ -33,13 +33,13 @@ def test_a_sound_exchange_passes():
 @pytest.mark.parametrize(
     ("name", "value", "words"),
     [
-        ("late", 2, "earlier question"),
+        ("late", 2, "earlier request"),
         ("answer_ns", 2_290_000, "adapter is slow"),
         ("incomplete", 13, "Frames are lost"),
         ("unasked", 0, "Too few"),
     ],
 )
-def test_a_wrong_exchange_is_named(name, value, words):
+def test_a_faulty_exchange_is_reported(name, value, words):
     wrong = {**EXCHANGE, name: np.array(value)}
     assert words in bus.judge_timing(wrong).cause
 
@@ -66,11 +66,11 @@ def test_joints_that_stop_at_their_limits_pass():
         (turned(3, scale=0.5), "travel of joint 4"),
     ],
 )
-def test_a_wrong_encoder_is_named(values, words):
+def test_a_wrong_encoder_is_reported(values, words):
     assert words in manual_joints.judge(values).cause
 
 
-def test_a_joint_that_moves_along_is_named():
+def test_a_joint_that_moves_with_another_is_reported():
     values = turned()
     values["high"][4, 5] = 1.0
     assert "Joint 5 was turned, joint 6 moved" in manual_joints.judge(values).cause
@@ -96,7 +96,7 @@ def test_a_sound_stop_passes_and_one_that_leaves_the_power_on_fails():
     assert "stop button" in stop_circuit.judge(pressed(silent_after=200)).cause
 
 
-def test_a_module_that_does_not_return_to_idle_in_time_is_named():
+def test_a_module_that_does_not_return_to_idle_in_time_is_reported():
     sound = pressed()
     mode, t_ns = sound["mode"].copy(), sound["t_ns"].copy()
     mode[20] = SafetyMode.ACTIVE
@@ -110,7 +110,7 @@ def test_a_module_that_does_not_return_to_idle_in_time_is_named():
     assert "does not go back" in stop_circuit.judge({**sound, "mode": mode}).cause
 
 
-def test_a_module_braked_by_its_heartbeat_only_is_named():
+def test_a_module_braked_by_its_heartbeat_only_is_reported():
     sound = pressed()
     for pause_ns, is_named in ((4_000_000, False), (104_000_000, True)):
         t_ns = sound["t_ns"].copy()
@@ -120,12 +120,12 @@ def test_a_module_braked_by_its_heartbeat_only_is_named():
         seen |= {"early_ns": t_ns[21] + 4_000_000}  # the module reports it then
         cause = stop_circuit.judge(seen).cause
         assert ("does not go back to idle" in cause) is is_named, cause
-    # A pause at another time says nothing of the module.
+    # A pause at another time does not concern the module.
     far = {**seen, "early_ns": np.array(2_000_000_000)}
     assert stop_circuit.judge(far).cause == ""
 
 
-def test_an_unusual_setting_is_named():
+def test_an_unusual_setting_is_reported():
     values = {
         "unusual": texts(["rig.toml: loop.test_time = 0.5"]),
         "load": np.array(1.0),
@@ -135,7 +135,7 @@ def test_an_unusual_setting_is_named():
     assert configuration.judge({**values, "unusual": texts([])}).cause == ""
 
 
-def test_an_arm_that_moves_without_torque_is_named():
+def test_an_arm_that_moves_without_torque_is_reported():
     q = np.tile(CONSTANTS.home, (500, 1))
     values = {"t_ns": np.arange(500) * 2_000_000, "q": q, "ended": texts([])}
     assert rest_pose.judge_rest(values).cause == ""

@@ -68,11 +68,11 @@ def test_a_sound_arm_passes():
 
 
 @pytest.mark.parametrize("lag", [-0.006, 0.006, 0.02])
-def test_a_lag_of_the_forces_is_named(lag):
+def test_a_lag_of_the_forces_is_reported(lag):
     assert cause(**rocked(lag)).startswith("forces behind positions")
 
 
-def test_a_foot_that_was_hardly_rocked_is_named():
+def test_a_foot_that_was_hardly_rocked_is_reported():
     assert cause(**rocked(amplitude=0.05)).startswith("swing of the foot's weight")
 
 
@@ -82,16 +82,16 @@ def test_a_recording_without_sensor_readings_fails():
 
 
 @pytest.mark.parametrize("stiffness", [9.5, 15.0, 29.0])
-def test_a_lock_of_another_stiffness_is_named(stiffness):
+def test_a_lock_of_another_stiffness_is_reported(stiffness):
     assert cause(**turned(stiffness)).startswith("stiffness of joint 7's lock")
 
 
-def test_a_lock_that_rings_is_named():
+def test_an_oscillating_lock_is_reported():
     assert cause(**turned(back=0.6)).startswith("overshoot after the release")
     assert cause(**turned(back=0.3)) == ""
 
 
-def test_too_small_a_moment_is_named():
+def test_too_small_a_moment_is_reported():
     assert cause(**turned(moment=0.1)).startswith("moment that turned the foot")
 
 

@@ -38,7 +38,7 @@ def test_an_arm_without_the_earlier_steps_is_not_driven(scene, tmp_path):
     assert not files.record.steps
 
 
-def test_a_stale_earlier_step_is_named(scene, tmp_path):
+def test_a_stale_earlier_step_is_reported(scene, tmp_path):
     scene.start()
     record = sound_record(scene.rig, scene.info)
     lift = record.of(StepId.LIFT)

@@ -130,7 +130,7 @@ def test_a_complete_record_lacks_no_step():
     require([])
 
 
-def test_without_a_record_every_step_is_missing_and_the_first_is_named():
+def test_without_a_record_every_step_is_missing_and_the_first_is_reported():
     lacking = lacks(None, INPUTS, NOON)
     assert [lack.step for lack in lacking] == list(ORDER)
     with pytest.raises(PreflightError, match="C0 configuration: not done, and 11 more"):
@@ -186,7 +186,7 @@ def test_a_record_dated_in_the_future_does_not_count():
     assert [lack.step for lack in lacking] == list(ORDER)
 
 
-def test_a_step_that_failed_is_named_with_its_cause():
+def test_a_step_that_failed_is_reported_with_its_cause():
     record = whole().with_step(
         done(StepId.RAMPS, verdict="wrong", cause="joint 3 moves the other way")
     )

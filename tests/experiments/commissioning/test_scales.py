@@ -20,11 +20,11 @@ def test_a_sound_sensor_agrees_with_scales(tool, seed):
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_a_sensor_of_another_scale_is_named(tool, seed):
+def test_a_sensor_of_another_scale_is_reported(tool, seed):
     cause = scales.judge(HeldArm(tool, seed, "sensor-scale-95").plate()).cause
     assert "sensor beyond the kitchen scale" in cause
 
 
-def test_a_scale_that_was_read_wrongly_is_named(tool):
+def test_a_scale_that_was_read_wrongly_is_reported(tool):
     cause = scales.judge(HeldArm(tool, 1).plate(3.8 * GRAVITY)).cause
     assert "the scale was read wrongly" in cause

@@ -58,7 +58,7 @@ def commissioned(present):
 
 @pytest.fixture(scope="module")
 def sound(tmp_path_factory):
-    """A rig as it was commissioned."""
+    """A rig that has not changed since its commissioning."""
     folder = tmp_path_factory.mktemp("sound")
     write_config(folder)
     return connected(folder)

@@ -28,14 +28,14 @@ def test_an_untouched_folder_has_no_changes(folder):
 
 
 @pytest.mark.parametrize("index", [0, 100, 255])
-def test_one_changed_byte_is_named(folder, index):
+def test_one_changed_byte_is_reported(folder, index):
     content = bytearray((folder / "a.txt").read_bytes())
     content[index] ^= 1
     (folder / "a.txt").write_bytes(content)
     assert texts(folder) == ["a.txt is changed"]
 
 
-def test_a_missing_and_a_new_file_are_named(folder):
+def test_a_missing_and_a_new_file_are_reported(folder):
     (folder / "deep" / "b c.txt").rename(folder / "new.txt")
     assert texts(folder) == ["deep/b c.txt is missing", f"new.txt is not in {SUMS}"]
 
@@ -62,7 +62,7 @@ def test_an_invalid_list_is_refused_with_its_line(folder, content):
         changed_files(folder)
 
 
-def test_a_missing_list_is_named(folder):
+def test_a_missing_list_is_reported(folder):
     (folder / SUMS).unlink()
     with pytest.raises(TrialFileError, match=SUMS):
         changed_files(folder)

@@ -99,7 +99,7 @@ def test_datacite_has_its_required_fields_and_leaves_the_doi_open(about):
     assert rights["rightsIdentifier"] == "CC-BY-4.0"
 
 
-def test_the_licence_is_named_with_its_address(about):
+def test_the_licence_is_reported_with_its_address(about):
     text = licence_text(about)
     assert LICENCES["CC-BY-4.0"].url in text
     assert "MIT" in text

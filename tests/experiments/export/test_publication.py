@@ -151,7 +151,7 @@ def test_an_invalid_table_of_results_is_refused(text):
 # --- the command ----------------------------------------------------------------------
 
 
-def test_without_rocrate_the_extra_is_named_and_nothing_written(
+def test_without_rocrate_the_extra_is_reported_and_nothing_written(
     recorded, tmp_path, monkeypatch
 ):
     monkeypatch.setitem(sys.modules, "rocrate", None)
@@ -216,7 +216,7 @@ def test_an_unchanged_publication_is_verified(published):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["T02.mcap", "fits.csv", METADATA, "README.md"])
-def test_one_changed_byte_of_a_publication_is_named(published, tmp_path, name):
+def test_one_changed_byte_of_a_publication_is_reported(published, tmp_path, name):
     copy = tmp_path / "crate"
     shutil.copytree(published, copy)
     (path,) = copy.rglob(name)
@@ -285,7 +285,7 @@ def test_results_are_rebuilt_from_the_recordings(published):
 
 
 @pytest.mark.slow
-def test_a_forged_result_is_named_by_a_rebuild(published, tmp_path):
+def test_a_forged_result_is_reported_by_a_rebuild(published, tmp_path):
     copy = tmp_path / "crate"
     shutil.copytree(published, copy)
     table = copy / "results" / "fits.csv"

@@ -57,7 +57,7 @@ def test_a_missing_file_named_only_by_the_description_is_reported(crate):
     assert texts(crate) == [f"fits.csv is missing; {METADATA} names it"]
 
 
-def test_a_missing_file_is_named_once(crate):
+def test_a_missing_file_is_reported_once(crate):
     (crate / "fits.csv").unlink()
     assert texts(crate) == ["fits.csv is missing"]
 
@@ -126,7 +126,7 @@ def test_a_missing_file_that_is_described_twice_is_reported_once(crate):
     assert texts(crate) == [f"fits.csv is missing; {METADATA} names it"]
 
 
-def test_a_journal_with_two_faults_is_named_once(crate):
+def test_a_journal_with_two_faults_is_reported_once(crate):
     journal = crate / SESSION / "events.jsonl"
     lines = journal.read_bytes().splitlines(keepends=True)
     journal.write_bytes(b"".join(lines[:4] + lines[5:8]))

@@ -297,7 +297,7 @@ def test_a_table_copied_out_of_its_folder_stays_simulated(
     assert series.is_simulated
 
 
-def test_without_pyarrow_the_extra_is_named_and_nothing_written(
+def test_without_pyarrow_the_extra_is_reported_and_nothing_written(
     recorded, tmp_path, monkeypatch
 ):
     monkeypatch.setitem(sys.modules, "pyarrow", None)

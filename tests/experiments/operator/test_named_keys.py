@@ -101,7 +101,7 @@ def test_the_continuation_after_a_fault_names_existing_keys(prompt):
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_only_a_fault_that_leaves_the_session_open_says_how_to_continue(fault):
+def test_only_a_fault_that_leaves_the_session_open_states_how_to_continue(fault):
     leaves_open = FAULTS[fault].actions[-1] in {
         Action.END_TRIAL,
         Action.HOLD,

@@ -42,7 +42,7 @@ def test_a_script_has_times_and_buttons():
         "stop 8 low",
     ],
 )
-def test_an_invalid_line_is_named(line):
+def test_an_invalid_line_is_reported(line):
     with pytest.raises(SettingsError, match="line 2"):
         parse_script(f"1 idle\n{line}")
 

@@ -53,7 +53,7 @@ def test_a_setting_newer_than_the_session_counts_as_its_default(folder):
     assert check(folder, NOW) == []
 
 
-def test_a_newer_setting_that_is_not_at_its_default_is_named(folder):
+def test_a_newer_setting_that_is_not_at_its_default_is_reported(folder):
     write_conditions(folder, without(NOW, LATER))
     with pytest.raises(SessionError, match=f"{LATER} was {DEFAULTS[LATER]}, is 4000"):
         check(folder, {**NOW, LATER: "4000"})
@@ -88,7 +88,7 @@ def test_defaults_of_the_sensor_in_use_are_no_differences():
     assert differences({"rig.ft_sensor.sinc": "64"}, {}) == []
 
 
-def test_a_changed_default_of_the_sensor_is_named():
+def test_a_changed_default_of_the_sensor_is_reported():
     now = {"rig.ft_sensor.kind": "bota", "rig.ft_sensor.calibration": "other.toml"}
     (text,) = differences({"rig.ft_sensor.kind": "bota"}, now)
     assert "rig.ft_sensor.calibration" in text

@@ -1,4 +1,4 @@
-"""`traction setup` prints what it writes below a root, and writes nothing else."""
+"""`traction setup` prints the files that it writes below a root, and only these."""
 
 import sys
 
@@ -98,7 +98,7 @@ def test_a_bus_without_socketcan_has_no_unit(root, tmp_path):
     assert not [name for name in written(root) if "systemd" in name]
 
 
-def test_commands_that_fail_or_are_missing_are_named():
+def test_commands_that_fail_or_are_missing_are_reported():
     good, bad = [sys.executable, "-c", ""], [sys.executable, "-c", "exit('no')"]
     failed = run_all([good, bad, ["no-such-program-here"]])
     assert len(failed) == 2

@@ -20,7 +20,7 @@ def refusal(error, monkeypatch):
     return str(refused.value)
 
 
-def test_an_interface_that_is_down_is_named_with_its_setup_command(monkeypatch):
+def test_an_interface_that_is_down_is_reported_with_its_setup_command(monkeypatch):
     text = refusal(LinkError("can0 is down."), monkeypatch)
     assert setup_command("can0", 1_000_000) in text
 

@@ -42,7 +42,7 @@ def test_no_loop_runs_after_a_refusal(tmp_path):
     assert "loop" not in marks(refused(tmp_path, "ft-silent"))
 
 
-def test_the_bus_is_named_with_its_transport(tmp_path):
+def test_the_bus_is_reported_with_its_transport(tmp_path):
     done = refused(tmp_path, "not-zeroed")
     assert "simulated, python-can" in done.out
 

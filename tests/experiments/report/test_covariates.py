@@ -29,7 +29,7 @@ def test_a_column_that_cannot_be_tested_is_reported_with_the_cause(tables, tmp_p
     assert "temp: not tested (2 trials with samples, it takes 3)." in done.out
 
 
-def test_a_missing_column_is_named_with_the_option(tables, tmp_path):
+def test_a_missing_column_is_reported_with_the_option(tables, tmp_path):
     done = traction("fit", *tables, "--to", tmp_path / "fit", "--covariate", "wet")
     assert done.code == 2
     assert "no column wet" in done.err

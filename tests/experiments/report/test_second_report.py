@@ -1,4 +1,4 @@
-"""A report that is made a second time computes nothing anew."""
+"""A repeated report computes nothing again."""
 
 import json
 import os

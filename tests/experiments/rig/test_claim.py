@@ -66,7 +66,7 @@ def test_a_foreign_frame_of_the_host_node_is_another_master(bus, after_ms):
     assert frames_of(bus.link, bus) == []
 
 
-def test_every_foreign_identifier_is_named_once(bus):
+def test_every_foreign_identifier_is_reported_once(bus):
     bus.talk = {bus.t_ns: 0x404, bus.t_ns + 1: 0x401, bus.t_ns + 2: 0x404}
     with pytest.raises(PreflightError, match="identifiers 401 404"):
         check_alone(bus.link, bus, "traction-fake:bus")

@@ -25,7 +25,7 @@ def let_pass(clock, ns):
 def test_a_simulation_that_is_ahead_waits_for_the_wall_clock(world, wall):
     pace, start_ns = WallPace(world, wall), wall.now_ns()
     for _ in range(100):
-        let_pass(wall, TICK_NS // 4)  # what the simulation takes
+        let_pass(wall, TICK_NS // 4)  # duration of the simulation
         let_pass(world, TICK_NS)
         pace.keep()
     assert wall.now_ns() - start_ns == 100 * TICK_NS

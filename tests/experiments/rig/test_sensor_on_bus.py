@@ -45,7 +45,7 @@ def trial(session):
     return session[0] / "trials" / "T01.mcap"
 
 
-def test_the_sensor_is_named_in_the_preflight_and_its_file(session, trial):
+def test_the_sensor_is_reported_in_the_preflight_and_its_file(session, trial):
     folder, done, _ = session
     assert "Barrett force/torque sensor, node 8, 20 of 20 questions" in done.out
     assert sidecar(trial)["status"] == "complete"
@@ -132,7 +132,7 @@ def test_an_option_of_another_sensor_kind_is_refused_by_name(
     assert f'"{kind}"' in done.err
 
 
-def test_an_invalid_sensor_option_is_named_without_the_kind(tmp_path):
+def test_an_invalid_sensor_option_is_reported_without_the_kind(tmp_path):
     config = write_config(tmp_path, rig=("sinc = 64", "sinc = 13"))
     done = traction("check", "--config-only", "--config", config)
     assert done.err.startswith(

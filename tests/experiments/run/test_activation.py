@@ -98,7 +98,7 @@ def test_activation_times_out_without_space():
     ("silent", "named"),
     [(0b0000100, "Puck 3 has"), (0b1000001, "Pucks 1,7 have")],
 )
-def test_silent_pucks_are_named_before_the_pendant_is_asked_for(silent, named):
+def test_silent_pucks_are_reported_before_the_pendant_is_asked_for(silent, named):
     loop = bench(fresh=ALL & ~silent, state=ArmState.IDLE)
     with pytest.raises(PreflightError) as refused:
         activate(loop)
@@ -107,7 +107,7 @@ def test_silent_pucks_are_named_before_the_pendant_is_asked_for(silent, named):
     assert looks(loop) == 0
 
 
-def test_a_bus_that_is_down_is_named_instead_of_the_pucks():
+def test_a_bus_that_is_down_is_reported_instead_of_the_pucks():
     loop = bench(fresh=0, state=ArmState.IDLE)
     loop.loop_client.loop.bus_condition = BusCondition.DOWN
     with pytest.raises(PreflightError) as refused:

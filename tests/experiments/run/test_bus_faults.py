@@ -210,7 +210,7 @@ def test_lost_replies_are_counted_in_the_trial(endured):
         ("puck-error", "33-35 °C, puck 3 reports error 7"),
     ],
 )
-def test_a_faulty_puck_is_named_at_the_preflight(config, tmp_path, fault, text):
+def test_a_faulty_puck_is_reported_at_the_preflight(config, tmp_path, fault, text):
     def quit_at_once(asked, rig):
         return "q" if asked.prompt is Prompt.SUPPORT else None
 

@@ -78,7 +78,7 @@ AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 
 
 @pytest.mark.parametrize("axis", range(6))
-def test_a_frozen_channel_is_named_and_the_sensor_is_not_ticked(
+def test_a_frozen_channel_is_reported_and_the_sensor_is_marked_unreliable(
     first_trial, cycles, tmp_path, axis
 ):
     """A single frozen channel casts doubt on the whole sensor."""
@@ -109,7 +109,7 @@ def test_impossible_quick_fits_are_left_out_of_the_comparison(first_trial):
     assert "(3 before: 0.80" in review.lines([*impossible, 0.8, 0.8, 0.8])[4][1]
 
 
-def test_a_quick_fit_of_doubtful_forces_is_not_ticked(first_trial):
+def test_a_quick_fit_of_doubtful_forces_is_marked_unreliable(first_trial):
     doubt = Doubt("lag", "the force is 500 ms late", "a queue")
     mark, text = replace(review_trial(first_trial), doubts=(doubt,)).lines()[4]
     assert mark == WARNING

@@ -93,7 +93,7 @@ def test_a_resumed_session_does_not_report_itself_as_open(resumed):
     assert "is open in process" not in resumed.done.out
 
 
-def test_a_resume_says_what_happens_to_the_running_trial(resumed):
+def test_a_resume_states_what_happens_to_the_running_trial(resumed):
     first, second, *_ = resumed.done.out.splitlines()
     assert first == (
         "S001 ended without closing. T02 will be redone, its data are in "

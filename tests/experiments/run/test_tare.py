@@ -279,7 +279,7 @@ def test_too_many_refused_tares_end_the_session(tmp_path, capsys):
     assert events(context, Event.TARED) == []
 
 
-def test_flagged_samples_are_named_when_a_tare_is_refused(tmp_path):
+def test_flagged_samples_are_reported_when_a_tare_is_refused(tmp_path):
     context = lifted(tmp_path)
     context.loop_client.is_valid = False
     with pytest.raises(PreflightError, match="flagged"):

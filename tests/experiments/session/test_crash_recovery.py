@@ -25,7 +25,7 @@ MAX_STEPS = 60  # more changes of the disk than a verdict or a recovery makes
 
 
 class KilledError(BaseException):
-    """The process is gone."""
+    """Stands for the death of the process."""
 
 
 @pytest.fixture(autouse=True)

@@ -91,7 +91,7 @@ def test_sessions_alongside_a_hostile_one_are_still_counted(data, config, outsid
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_a_pipe_is_named_and_not_waited_for(data, config, name):
+def test_a_pipe_is_reported_and_not_waited_for(data, config, name):
     path = only_session(data) / name
     path.unlink()
     os.mkfifo(path)

@@ -57,11 +57,11 @@ def test_a_sound_session_has_no_deviations(data):
     assert files(data) == set()
 
 
-def test_missing_and_changed_files_are_named(damaged):
+def test_missing_and_changed_files_are_reported(damaged):
     assert files(damaged) == {"trials/T01.json", "trials/T02.mcap"}
 
 
-def test_a_trial_changed_together_with_its_sidecar_is_named(data):
+def test_a_trial_changed_together_with_its_sidecar_is_reported(data):
     path = only_session(data) / "trials" / "T01.mcap"
     cut(path)
     fields = sidecar(path) | {"sha256": digest(path)}
@@ -117,7 +117,7 @@ LOSSES = (
 
 
 @pytest.mark.parametrize("lose", LOSSES)
-def test_a_damaged_journal_is_named(data, lose):
+def test_a_damaged_journal_is_reported(data, lose):
     lose(only_session(data))
     assert "events.jsonl" in files(data)
     done = traction("verify", "--all", "--data", data)
@@ -138,7 +138,7 @@ def test_no_report_is_made_of_a_session_with_a_damaged_journal(data, lose):
 def test_a_session_with_a_damaged_journal_is_neither_opened_nor_changed(
     data, lose, command
 ):
-    """The derived files are the only evidence of what the journal lost."""
+    """Only the derived files show which lines the journal lost."""
     session = only_session(data)
     lose(session)
     before = {p: p.read_bytes() for p in session.rglob("*.*") if p.name != ".lock"}
@@ -150,7 +150,7 @@ def test_a_session_with_a_damaged_journal_is_neither_opened_nor_changed(
 
 
 @pytest.mark.parametrize("lose", [_empty, _missing, _cut_after_first_kept])
-def test_a_changed_recording_is_named_without_the_journal(data, lose):
+def test_a_changed_recording_is_reported_without_the_journal(data, lose):
     session = only_session(data)
     lose(session)
     path = session / "trials" / "T02.mcap"
@@ -162,7 +162,7 @@ def test_a_changed_recording_is_named_without_the_journal(data, lose):
 
 
 @pytest.mark.parametrize("lose", [_empty, _missing, _cut_after_first_kept])
-def test_a_missing_recording_is_named_without_the_journal(data, lose):
+def test_a_missing_recording_is_reported_without_the_journal(data, lose):
     session = only_session(data)
     lose(session)
     for path in session.glob("trials/T02.*"):
@@ -184,7 +184,7 @@ def test_a_session_folder_with_a_foreign_name_is_reported(data):
     assert "my favourite holds a journal, and is not called like a session" in done.err
 
 
-def test_a_sidecar_unknown_to_the_journal_is_named(data):
+def test_a_sidecar_unknown_to_the_journal_is_reported(data):
     trials = only_session(data) / "trials"
     for suffix in (".mcap", ".json"):
         shutil.copy(trials / f"T01{suffix}", trials / f"T09{suffix}")
@@ -237,7 +237,7 @@ def test_verify_requires_sessions_or_all(data):
 def test_the_remaining_trials_are_exported_with_allow_missing(
     data, config, lost, exported
 ):
-    """A lost sidecar is only named: the journal says that the trial is kept."""
+    """A lost sidecar is only reported: the journal states that the trial is kept."""
     (only_session(data) / "trials" / lost).unlink()
     to = data.parent / "tables"
     arguments = ("export", "S001", "--to", to, "--allow-missing")
@@ -268,7 +268,7 @@ def copied(data):
     return data
 
 
-def test_a_copied_session_is_named(copied):
+def test_a_copied_session_is_reported(copied):
     done = traction("verify", "--all", "--data", copied)
     assert done.code == 6
     assert "S002 session.json is of S001: a copy, or a renamed session" in done.err
@@ -331,7 +331,7 @@ def test_a_session_whose_name_contradicts_its_journal_does_not_count(
     assert [row for row in json.loads(status.out) if row["kept"]] == []
 
 
-def test_a_copy_with_the_same_number_is_named_and_does_not_count(data):
+def test_a_copy_with_the_same_number_is_reported_and_does_not_count(data):
     folder = only_session(data)
     shutil.copytree(folder, folder.with_name("2099-01-01" + folder.name[10:]))
     done = traction("verify", "--all", "--data", data)
@@ -345,7 +345,7 @@ def test_a_copy_with_the_same_number_is_named_and_does_not_count(data):
 
 
 @pytest.mark.parametrize("text", [None, "{"])
-def test_a_missing_or_damaged_session_json_is_named(data, text):
+def test_a_missing_or_damaged_session_json_is_reported(data, text):
     path = only_session(data) / "session.json"
     path.unlink()
     if text is not None:

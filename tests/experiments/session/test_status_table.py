@@ -1,4 +1,4 @@
-"""The status table counts what is on the disk now, however often it is read."""
+"""The status table counts the current files on the disk at every call."""
 
 import os
 

@@ -77,13 +77,13 @@ def test_a_session_open_in_a_process_is_not_unfinished(tmp_path):
     assert len(find_unfinished(tmp_path)) == 1
 
 
-def test_a_crash_before_a_verdict_is_named(tmp_path):
+def test_a_crash_before_a_verdict_is_reported(tmp_path):
     make_session(tmp_path, *KEPT_AND_RUNNING)
     (found,) = find_unfinished(tmp_path)
     assert "(T02 before its verdict)" in found.text()
 
 
-def test_a_crash_between_trials_is_named(tmp_path):
+def test_a_crash_between_trials_is_reported(tmp_path):
     make_session(tmp_path, *KEPT_AND_RUNNING[:-1])
     (found,) = find_unfinished(tmp_path)
     assert "(between trials)" in found.text()
@@ -135,7 +135,7 @@ def test_a_key_resumes_or_closes_the_unfinished_session(tmp_path, keys, choice):
     assert press(keys, find_unfinished(tmp_path), "B0") is choice
 
 
-def test_both_terrains_and_both_choices_are_named(tmp_path, capsys):
+def test_both_terrains_and_both_choices_are_reported(tmp_path, capsys):
     make_session(tmp_path, START, ACTIVE, LEFT)
     press(b"1", find_unfinished(tmp_path), "B0")
     assert capsys.readouterr().out == (
@@ -144,7 +144,7 @@ def test_both_terrains_and_both_choices_are_named(tmp_path, capsys):
     )
 
 
-def test_the_question_after_a_crash_says_what_a_resume_does(tmp_path, capsys):
+def test_the_question_after_a_crash_states_what_a_resume_does(tmp_path, capsys):
     leave_partial(make_session(tmp_path, *KEPT_AND_RUNNING))
     press(b"r", find_unfinished(tmp_path), "S10")
     assert capsys.readouterr().out.startswith(

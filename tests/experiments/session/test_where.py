@@ -59,7 +59,7 @@ def test_an_invalid_condition_is_refused(text):
         ("operator=ada", "There is none yet."),
     ],
 )
-def test_an_unused_value_is_refused_and_the_known_values_are_named(text, hint):
+def test_an_unused_value_is_refused_and_the_known_values_are_reported(text, hint):
     facts = [
         {"terrain": "S0", "incline_deg": 15.0, "kind": "live"},
         {"terrain": "B0", "incline_deg": 0.0, "kind": "simulated", "load": None},

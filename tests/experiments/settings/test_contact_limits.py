@@ -1,4 +1,4 @@
-"""Limits of contact stay within what the fitted sensor measures."""
+"""Contact limits stay within the range of the fitted sensor."""
 
 import pytest
 

@@ -86,7 +86,7 @@ def test_a_clumsy_hand_touches_the_frame_and_lifts_the_foot(plant):
     on_the_way = (x > 0.28) & (x < 0.32)
     assert z[on_the_way].max() > 0.010
     assert (F_n[on_the_way] == 0.0).any()
-    assert x[-1] > 0.34  # and the foot goes on
+    assert x[-1] > 0.34  # the foot continues
 
 
 @pytest.mark.slow

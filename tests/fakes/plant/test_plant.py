@@ -73,7 +73,7 @@ def sunk(seconds, windings=1.0, **options):
 
 def test_an_idle_arm_sinks_slowly_on_shorted_windings():
     assert 0.12 < sunk(0.5) < 0.16
-    assert sunk(1.0) > 1.8 * sunk(0.5)  # the unsupported arm goes on sinking
+    assert sunk(1.0) > 1.8 * sunk(0.5)  # the unsupported arm continues to sink
 
 
 def test_an_arm_sinks_faster_the_less_its_windings_damp():

@@ -17,7 +17,7 @@ from wam.driver.arm import WamArm
 from wam.driver.settings import ArmSettings
 
 SETTINGS = ArmSettings()
-# A third of the smallest speed limit; the light joint 7 has a quarter of its own.
+# A third of the smallest speed limit; for the light joint 7 a quarter of its limit.
 SPEED_BOUND = dict.fromkeys(range(1, 7), 0.5) | {7: 1.0}  # rad/s
 PERIOD = 0.002
 TORQUE = np.array([20.0, 45.0, 15.0, 15.0, 2.5, 2.5, 1.3])

@@ -95,7 +95,7 @@ def test_a_sensor_left_in_configuration_mode_opens():
 
 
 @pytest.mark.parametrize(("letter", "text"), [("c", "c,0,1,0,4"), ("f", "f,64,0,0,0")])
-def test_refused_command_is_named(letter, text):
+def test_refused_command_is_reported(letter, text):
     bench = Bench(BotaOptions(refused=letter))
     with pytest.raises(DeviceFaultError, match=f"refused '{text}' with code 1"):
         bench.sensor.open()

@@ -107,7 +107,7 @@ def test_another_unit_than_that_of_the_report_is_refused():
         other.sensor.open()
 
 
-def test_a_refused_configuration_is_named():
+def test_a_refused_configuration_is_reported():
     with pytest.raises(DeviceFaultError, match="refused its configuration with code 3"):
         SensorBench("optoforce", refusal=3).sensor.open()
 
@@ -119,7 +119,7 @@ def test_a_failing_sensor_is_refused_at_the_start():
         bench.sensor.open()
 
 
-def test_firmware_of_the_older_protocol_is_named():
+def test_firmware_of_the_older_protocol_is_reported():
     bench = SensorBench("optoforce", is_deaf=True)
     bench.device.firmware.frame = lambda shown, status: bytes((55, 67)) + bytes(20)
     with pytest.raises(DeviceFaultError, match="older protocol"):

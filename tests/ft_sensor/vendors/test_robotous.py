@@ -105,7 +105,7 @@ def test_a_setting_that_was_not_applied_is_detected():
         SensorBench("robotous", forgets=True).sensor.open()
 
 
-def test_a_refused_setting_is_named_with_its_reason():
+def test_a_refused_setting_is_reported_with_its_reason():
     refusing = SensorBench("robotous", refused=(robotous.SET_RATE,))
     with pytest.raises(DeviceFaultError, match="refused command 0x0f 8: out of range"):
         refusing.sensor.open()
@@ -137,7 +137,7 @@ def test_an_absurd_load_at_the_start_is_refused():
         SensorBench("robotous", load=(0, 0, 0, 9.0, 0, 0)).sensor.open()
 
 
-def test_a_sensor_that_stops_answering_is_named():
+def test_a_sensor_that_stops_answering_is_reported():
     bench = SensorBench("robotous", is_running=True, is_deaf=True)
     with pytest.raises(LinkTimeoutError, match="command 0x01"):
         bench.sensor.open()

@@ -93,7 +93,7 @@ def test_an_unsolicited_reply_is_reported(log):
     assert log.reader.tally.unsolicited == 2
 
 
-def test_a_puck_that_misses_one_round_is_named(log):
+def test_a_puck_that_misses_one_round_is_reported(log):
     for cycle in range(2):
         log(cycle * 2 * MS, "404 30")
         for node in (1, 2, 3, 4, 6, 7) if cycle == 0 else range(1, 8):

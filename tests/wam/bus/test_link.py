@@ -73,7 +73,7 @@ def test_an_interface_that_is_down_is_reported_with_the_remedy(opened):
     assert setup_command("can0", 1_000_000) in caught.value.hint
 
 
-def test_an_interface_that_is_missing_is_named(opened):
+def test_an_interface_that_is_missing_is_reported(opened):
     with pytest.raises(LinkError, match="can0 does not exist"):
         opened(OSError(errno.ENODEV, "No such device"))()
 

@@ -67,7 +67,7 @@ def test_the_direction_that_candump_adds_is_accepted():
         KNOWN + KNOWN,
     ],
 )
-def test_a_malformed_line_is_named(text):
+def test_a_malformed_line_is_reported(text):
     problems = []
     frames = list(parse_log([KNOWN, text, KNOWN], problems.append))
     assert [frame.line for frame in frames] == [1, 3]

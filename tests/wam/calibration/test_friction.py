@@ -172,7 +172,7 @@ def test_a_friction_of_another_form_is_refused():
         check_friction(fit_friction(CONSTANTS, rows_of(truth(), 1), other, KNOWN))
 
 
-def test_a_motor_that_slid_in_one_direction_only_is_named():
+def test_a_motor_that_slid_in_one_direction_only_is_reported():
     rows = rows_of(truth(), 1)
     forwards = rows[3].sense > 0.0
     names = set(SlidingRows.__slots__) - {"compliance"}

@@ -20,7 +20,7 @@ from wam.model.arm_model import drive_inertia_matrix
 
 T, DELAY = 0.002, 0.5  # s; share of a cycle
 LOCK = LockGains()
-# Of critical, in the worst of all poses. Joint 7 has a lock of its own, which is fast.
+# Damping ratios in the worst of all poses; joint 7 has a separate, fast lock.
 DAMPED, DAMPED_FAST, FAST = 0.28, 0.18, 60.0  # FAST: rad/s
 DAMPED_GUIDE = 0.07
 pin = importlib.import_module("pinocchio")

@@ -54,7 +54,7 @@ def moved_one(motor):
 
 @pytest.mark.parametrize("motor", range(1, 8))
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_a_motor_pulled_beyond_breakaway_and_at_rest_is_named(motor, sign):
+def test_a_motor_pulled_beyond_breakaway_and_at_rest_is_reported(motor, sign):
     assert look(turned(motor), 1.01 * sign, moved_one(motor)) == motor
 
 
@@ -70,7 +70,7 @@ def test_a_motor_not_needed_by_the_move_may_stand(motor):
 
 
 @pytest.mark.parametrize("motor", range(1, 8))
-def test_a_motor_is_named_only_after_the_move_has_progressed(motor):
+def test_a_motor_is_reported_only_after_the_move_has_progressed(motor):
     """Motors of a differential wait for the progress of both of its joints."""
     largest = (np.abs(J2MP) @ PROGRESS)[motor - 1]
     for share, named in ((0.99, 0), (1.01, motor)):

@@ -76,7 +76,9 @@ def travel_rows():
     ("goal", "joint", "sense", "limit"),
     [pytest.param(*row, id=f"{name}-{row[2]:+.0f}") for name, *row in travel_rows()],
 )
-def test_travel_within_its_limit_passes_and_beyond_is_named(goal, joint, sense, limit):
+def test_travel_within_its_limit_passes_and_beyond_is_reported(
+    goal, joint, sense, limit
+):
     proof = PoweredTest(goal, CONSTANTS, reading())
     assert excess(proof, reading(**{f"j{joint}": 0.99 * sense * limit})) is None
     found = excess(proof, reading(**{f"j{joint}": 1.01 * sense * limit}))
@@ -85,7 +87,7 @@ def test_travel_within_its_limit_passes_and_beyond_is_named(goal, joint, sense, 
     assert found.limit == pytest.approx(sense * limit)
 
 
-def test_kinetic_energy_within_its_limit_passes_and_beyond_is_named():
+def test_kinetic_energy_within_its_limit_passes_and_beyond_is_reported():
     proof = PoweredTest(REST, CONSTANTS, reading())
     assert excess(proof, reading(10), 0.99 * LIMITS.energy) is None
     found = excess(proof, reading(10), 1.01 * LIMITS.energy)

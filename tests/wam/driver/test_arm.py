@@ -95,7 +95,7 @@ def test_the_first_positions_cause_no_speed_fault_of_the_module(vers):
         assert asked[-1] < after
 
 
-def test_a_missing_puck_is_named_with_those_that_answer():
+def test_a_missing_puck_is_reported_with_those_that_answer():
     rig = Rig()
     rig.network.silence(5)
     with pytest.raises(PreflightError) as caught:
@@ -104,7 +104,7 @@ def test_a_missing_puck_is_named_with_those_that_answer():
     assert caught.value.hint == "Check its cable or a puck in reset."
 
 
-def test_two_missing_pucks_are_named_in_the_plural():
+def test_two_missing_pucks_are_reported_in_the_plural():
     rig = Rig()
     rig.network.silence(1)
     rig.network.silence(5)
@@ -189,7 +189,7 @@ def test_a_reading_states_which_motors_answered_and_when(silent):
     reading = cycle(rig, arm)
     is_complete = silent == 0
     assert reading.host_ns == first.host_ns + CYCLE_NS
-    # Seven replies take 0.7 ms of wire; six of them arrive all the same.
+    # Seven replies take 0.7 ms on the wire; the other six arrive normally.
     assert 500_000 < reading.arm_ns - reading.host_ns <= 1_500_000
     assert reading.fresh == 0b1111111 & ~(1 << silent >> 1)
     assert reading.is_complete is is_complete

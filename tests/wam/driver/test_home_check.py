@@ -44,7 +44,7 @@ def test_encoders_of_another_resolution_are_scaled():
     assert fine[0] == pytest.approx(-2 * np.pi * 400 / 40960 / 42)
 
 
-def test_the_worst_joint_is_named_with_its_error():
+def test_the_worst_joint_is_reported_with_its_error():
     error = np.zeros(7)
     error[3] = -(HOME_LIMIT + 0.001)
     with pytest.raises(PreflightError, match=r"Joint 4 is -0\.031 rad .*limit 0\.03"):

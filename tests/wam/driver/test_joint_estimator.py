@@ -108,7 +108,7 @@ def test_missing_replies_are_extrapolated_for_a_limited_time(estimator):
     assert estimator.q == pytest.approx(last)  # extrapolation has ended
 
 
-def test_a_rejected_position_is_named_and_moves_no_joint(estimator):
+def test_a_rejected_position_is_reported_and_moves_no_joint(estimator):
     counts = move(estimator, 100)
     false = list(counts)
     false[3] += 3000
@@ -121,7 +121,7 @@ def test_a_rejected_position_is_named_and_moves_no_joint(estimator):
     assert estimator.q == pytest.approx(before, abs=1e-6)
 
 
-def test_the_faster_of_two_jumps_is_named(estimator):
+def test_the_faster_of_two_jumps_is_reported(estimator):
     counts = move(estimator, 100)
     false = list(counts)
     false[0], false[6] = counts[0] - 30_000, counts[6] + 3000

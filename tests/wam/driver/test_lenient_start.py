@@ -57,7 +57,7 @@ def field_set(index, bits):
     ("index", "bits"),
     [*((i, 0b000) for i in range(5)), (0, 0b011), (1, 0b101), (3, 0b110), (4, 0b111)],
 )
-def test_an_ambiguous_monitor_is_named_and_the_arm_starts(index, bits):
+def test_an_ambiguous_monitor_is_reported_and_the_arm_starts(index, bits):
     info = Bench(field_set(index, bits)).arm.start()
     assert info.pendant.inconsistent_monitors == (MONITORS[index],)
     (warning,) = info.warnings

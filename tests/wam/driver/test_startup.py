@@ -62,7 +62,7 @@ def test_a_stopped_arm_is_not_waited_for():
     assert rig.clock.t_ns - before < 500 * MS
 
 
-def test_all_missing_devices_are_named_at_once():
+def test_all_missing_devices_are_reported_at_once():
     rig = Rig()
     for node in (2, 6, 10):
         rig.network.silence(node)
@@ -137,7 +137,7 @@ def test_the_absolute_angle_survives_the_zeroing():
     assert [p.mech for p in arm.start().pucks] == before == list(rig.motors.position)
 
 
-def test_a_node_that_is_not_a_motor_is_named():
+def test_a_node_that_is_not_a_motor_is_reported():
     rig = Rig(counts=HOME_COUNTS)
     rig.network.set_property(4, "ROLE", int(PuckRole.SAFETY))
     with pytest.raises(PreflightError, match=r"Node 4 is not a motor puck"):
@@ -147,7 +147,7 @@ def test_a_node_that_is_not_a_motor_is_named():
 SLEEP = bytes.fromhex("85 00 00 00 00 00")
 
 
-def test_a_puck_that_does_not_wake_is_named():
+def test_a_puck_that_does_not_wake_is_reported():
     rig = Rig(counts=HOME_COUNTS)
     rig.link.send(5, SLEEP)
     rig.rest(600 * MS)

@@ -196,7 +196,7 @@ def test_a_silent_puck_is_shown_with_the_age_of_its_last_reply(bench):
     assert float(fields["pucks:age_s"].split()[2]) > 3.0
 
 
-def test_a_hot_or_faulty_puck_is_named():
+def test_a_hot_or_faulty_puck_is_reported():
     pucks = [PuckHealth(61, 30, 48, 0, 0), PuckHealth(60, 30, 48, 7, 0), PuckHealth()]
     expected = ["puck 1 at 61 °C (limit 60)", "puck 2 reports error 7"]
     assert health_warnings(pucks, S) == expected

@@ -51,7 +51,7 @@ def test_two_devices_with_one_node_number_are_counted(rig, node, after_ms, found
     assert answers.differing == []
 
 
-def test_devices_with_one_node_number_that_disagree_are_named(rig):
+def test_devices_with_one_node_number_that_disagree_are_reported(rig):
     other = encode_reply(STAT, 0, is_wide=False)
     rig.network.faults.answer_twice(property_reply_id(5), lambda _: other, MS)
     assert count(rig, 2).differing == [5]

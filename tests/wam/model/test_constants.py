@@ -74,7 +74,7 @@ def test_a_malformed_model_is_a_settings_error(name):
     assert caught.value.hint
 
 
-def test_a_missing_part_of_an_arm_model_is_named_in_one_line():
+def test_a_missing_part_of_an_arm_model_is_reported_in_one_line():
     text = load_constants().text.replace("[gravity]", "[weight]")
     with pytest.raises(SettingsError) as caught:
         load_constants(text)
@@ -84,7 +84,7 @@ def test_a_missing_part_of_an_arm_model_is_named_in_one_line():
     assert "http" not in message
 
 
-def test_contradicting_parts_of_an_arm_model_are_named_in_one_line():
+def test_contradicting_parts_of_an_arm_model_are_reported_in_one_line():
     with pytest.raises(SettingsError) as caught:
         load_constants(MALFORMED["stops crossed"])
     message = str(caught.value)

@@ -117,7 +117,7 @@ def test_torques_that_gravity_cannot_explain_are_refused():
         check_fit(fit_moments(CONSTANTS, poses, spoiled))
 
 
-def test_the_worst_joint_and_pose_are_named():
+def test_the_worst_joint_and_pose_are_reported():
     residuals = np.full((3, 7), 0.6)
     residuals[1, 4] = -2.0
     fit = MomentFit(CONSTANTS.mus, 12, 6.0, residuals)
