@@ -301,7 +301,8 @@ class _JointRows(_Rows):
             self._seen, self._order = joints.names, [] if -1 in order else order
         stamp_ns = joints.header.stamp_ns
         if not self._order:
-            return stamp_ns, joints.position, "without a joint of the leg"
+            lacking = next(name for name in self._wanted if name not in joints.names)
+            return stamp_ns, joints.position, f"without joint {lacking} of the URDF"
         if len(joints.position) != len(joints.names):
             return (
                 stamp_ns,
@@ -372,8 +373,8 @@ def require_no_jump(channel: JointChannel) -> None:
             f"{name} jumps {at:.3f} s after its first message: joint "
             f"{int(joint) + 1} of the leg goes from {q[row, joint]:.3f} to "
             f"{q[row + 1, joint]:.3f} in {float(steps[row, 0]) * 1e3:.2f} ms.",
-            hint=f"No joint moves faster than {FASTEST_JOINT:g} rad/s or m/s: cut the "
-            "log there, or record it again.",
+            hint=f"No joint moves faster than {FASTEST_JOINT:g} rad/s or m/s. Give "
+            "positions in rad or m; cut the log where it jumps once.",
         )
 
 

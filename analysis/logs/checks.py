@@ -15,6 +15,7 @@ from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import Array, TractionSeries
 from analysis.logs.clocks import lag_by_receipts
 from analysis.logs.estimates import (
+    LONGEST_LAG,
     SURE,
     Bools,
     Estimate,
@@ -39,6 +40,7 @@ from wam.model.constants import GRAVITY
 
 FREE_FORCE = 0.5  # N, limit of the force of a free foot and of the drift of a tare
 LARGEST_MASS_ERROR = 0.02  # kg
+LARGEST_TILT = 1.0  # degrees of the normal; at 2 degrees F_t/F_n is wrong by 0.035
 _ON_GROUND = 0.001  # m above its lowest position below which a foot is not free
 _LEAST_TURN = 2.0  # degrees of turn under load above which a mass of 0 is reported
 _MASS_STEP = 0.1  # kg, unit of mass in that warning
@@ -159,7 +161,7 @@ def tare_check(judged: AppliedImport, quiet: Bools) -> Check:
     stated = tuple(judged.payload.bias[:3].tolist())
     if not quiet.any():
         how = "the foot is never quiet 10 mm above its lowest position"
-        return Check("tare", stated, "N", (), (), how)
+        return Check("tare", stated, "N", (), (), how, f"--tare is not checked: {how}")
     rest = judged.force[quiet]
     mean = float(np.linalg.norm(rest.mean(axis=0)))
     spread = (float(np.mean(rest.std(axis=0))),)
@@ -204,7 +206,22 @@ def lag_check(judged: AppliedImport, request: ImportRequest) -> Check:
                 f"--lag {stated:.0f} ms; starts and stops show {low:.0f} to "
                 f"{high:.0f} ms"
             )
+    else:
+        warning = _unseen_lag(judged.record, stated)
     return _check("lag", (stated,), "ms", estimate, warning)
+
+
+def _unseen_lag(record: LegRecord, stated: float) -> str:
+    """Warn of a lag [ms] that neither the motion nor the clocks show."""
+    fits = [channel.clock.fit for channel in (record.joints, record.wrench)]
+    apart = lag_by_receipts(fits[0], fits[1])
+    shown = 0.0 if apart is None else apart * 1e3
+    if abs(stated - shown) <= LONGEST_LAG * 1e3:
+        return ""
+    return (
+        f"--lag {stated:.0f} ms: the clocks are {shown:.0f} ms apart, and the motion "
+        f"shows no further lag of up to {LONGEST_LAG * 1e3:.0f} ms"
+    )
 
 
 def clock_check(record: LegRecord) -> Check:
@@ -223,7 +240,17 @@ def normal_check(judged: AppliedImport) -> Check:
     """Check the normal by the path of the pressed foot."""
     pressed = judged.in_trials & (judged.values[:, 2] > PRESSED_FORCE)
     estimate = find_normal(judged.record.path.foot[pressed])
-    return _check("normal", tuple(judged.axes[2].tolist()), "", estimate)
+    stated, warning = judged.axes[2], ""
+    if estimate.value:
+        # along the path only: a straight one shows no tilt to its side
+        along = float(np.array(estimate.value) @ judged.axes[0])
+        tilt = math.degrees(math.asin(min(1.0, abs(along))))
+        if tilt > LARGEST_TILT + estimate.spread[0]:
+            warning = (
+                f"--normal is {tilt:.1f} degrees off the foot's path (limit "
+                f"{LARGEST_TILT:g} and {estimate.spread[0]:.1f} of the path)"
+            )
+    return _check("normal", tuple(stated.tolist()), "", estimate, warning)
 
 
 def direction_check(judged: AppliedImport) -> Check:
@@ -256,8 +283,8 @@ def warnings_of(judged: AppliedImport) -> list[str]:
         *_channel_warnings(judged),
         *(
             text
-            for first, end in judged.spans
-            for text in path_warnings(foot[first:end], judged.axes)
+            for number, (first, end) in enumerate(judged.spans, 1)
+            for text in path_warnings(f"T{number:02d}", foot[first:end], judged.axes)
         ),
     ]
 
@@ -305,6 +332,8 @@ def _moment_warnings(judged: AppliedImport) -> list[str]:
     force, moment = wrench[:, :3], wrench[:, 3:]
     sliding = judged.in_trials & (judged.values[:, 0] > SLOWEST)
     sliding &= judged.values[:, 2] > PRESSED_FORCE
+    if not sliding.any():
+        return []
     doubts = moment_doubts(force[sliding], moment[sliding])
     warnings = [replace(doubt, remedy=_OPTIONS).text for doubt in doubts]
     return [*warnings, *moment_warnings(moment, path.lever, force)]

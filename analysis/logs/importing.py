@@ -139,11 +139,12 @@ def import_log(request: ImportRequest) -> ImportedLog:
         ]
         raw = record.raw(request.lag)
         raw[_stuck_rows(record, request)] = np.nan
-        payload = _payload(request, record, raw)
+        extent = _extent(record.t, log.losses)
+        payload = _payload(request, record, raw, extent)
         sensor = record.path.sensor
         force = payload.to_base(payload.contact(raw, sensor), sensor)
         values = traction(axes, record.path.velocity, force)
-        spans = _trial_rows(request, record.t)
+        spans = _trial_rows(request, record.t, extent)
         judged = AppliedImport(record, spans, axes, payload, raw, force, values)
         checks = checks_of(judged, request)
         doubts = [check.warning for check in checks if check.warning]
@@ -216,9 +217,9 @@ def _rate_warnings(record: LegRecord, request: ImportRequest) -> list[str]:
         name, rate = channel.topic.name, 1.0 / step
         if rate < SLOWEST_RATE and not request.is_slow:
             raise SettingsError(
-                f"{request.log}: {name} has {rate:.1f} Hz, slips need "
-                f"{USUAL_RATE:.0f} Hz.",
-                hint="--slow takes it, for means only.",
+                f"{request.log}: {name} has {rate:.1f} Hz, the least is "
+                f"{SLOWEST_RATE:.0f} Hz.",
+                hint=f"Slips need {USUAL_RATE:.0f} Hz; --slow takes it for means.",
             )
         if rate < USUAL_RATE * 0.99:
             warnings.append(f"{name} has {rate:.1f} Hz: slips are not seen, means are")
@@ -270,7 +271,14 @@ def _stuck_rows(record: LegRecord, request: ImportRequest) -> Bools:
     return is_stuck & in_trial
 
 
-def _payload(request: ImportRequest, record: LegRecord, raw: Array) -> Payload:
+def _extent(t: Array, losses: Sequence[str]) -> str:
+    """The span of the log, and what could not be read of it."""
+    return " ".join([f"The log goes from 0 to {t[-1]:.1f} s.", *losses])
+
+
+def _payload(
+    request: ImportRequest, record: LegRecord, raw: Array, extent: str
+) -> Payload:
     """Make the payload from the stated tare and weight; raises SettingsError."""
     tare, weightless = (
         request.tare,
@@ -286,7 +294,7 @@ def _payload(request: ImportRequest, record: LegRecord, raw: Array) -> Payload:
             raise SettingsError(
                 f"--tare {tare[0]:g}:{tare[1]:g} holds {np.count_nonzero(rows)} "
                 "readings.",
-                hint=f"The log goes from 0 to {record.t[-1]:.1f} s.",
+                hint=extent,
             )
         # the foot touches nothing, so the reading minus the weight is the bias
         residual = weightless.contact(raw[rows], record.path.sensor[rows])
@@ -294,7 +302,7 @@ def _payload(request: ImportRequest, record: LegRecord, raw: Array) -> Payload:
     return Payload(request.mass, np.zeros(3), np.eye(3), request.sign, bias)
 
 
-def _trial_rows(request: ImportRequest, t: Array) -> list[tuple[int, int]]:
+def _trial_rows(request: ImportRequest, t: Array, extent: str) -> list[tuple[int, int]]:
     """Return (first, end) rows of every trial; raises SettingsError."""
     spans: list[tuple[int, int]] = []
     for begin, end in request.trials:
@@ -302,7 +310,7 @@ def _trial_rows(request: ImportRequest, t: Array) -> list[tuple[int, int]]:
         if rows[1] - rows[0] < _FEWEST_ROWS:
             raise SettingsError(
                 f"--trials {begin:g}:{end:g} holds {rows[1] - rows[0]} rows.",
-                hint=f"The log goes from 0 to {t[-1]:.1f} s.",
+                hint=extent,
             )
         spans.append(rows)
     return spans

@@ -135,8 +135,14 @@ def parse_urdf(path: Path, data: bytes) -> Urdf:
     joints: dict[str, UrdfJoint] = {}
     for element in elements:
         joint = _joint(path, element)
-        if joint.child in joints or not {joint.child, joint.parent} <= {*links}:
-            raise _refused(path, f"joint {joint.name}: its links do not form a tree")
+        for link in (joint.parent, joint.child):
+            if link not in links:
+                raise _refused(path, f"joint {joint.name}: no link {link}")
+        if joint.child in joints:
+            other = joints[joint.child].name
+            raise _refused(
+                path, f"link {joint.child} is the child of {other} and {joint.name}"
+            )
         joints[joint.child] = joint
     names = [joint.name for joint in joints.values()]
     if len({*links}) < len(links) or len({*names}) < len(names):
@@ -244,7 +250,8 @@ def _check_tree(path: Path, links: Sequence[str], joints: dict[str, UrdfJoint]) 
     """Refuse loops of links and more than one base."""
     bases = [link for link in links if link not in joints]
     if len(bases) != 1:
-        raise _refused(path, f"{len(bases)} links without a parent, one is the base")
+        few = ", ".join(bases[:_NEAREST])
+        raise _refused(path, f"{len(bases)} links without a parent, not one: {few}")
     for link in links:
         seen = {link}
         while link in joints:

@@ -85,15 +85,16 @@ def moment_warnings(moment: Array, lever: Array, force: Array) -> list[str]:
         return []
     return [
         f"the moments are {gain:.1f} times those of a force at the foot: two axes of "
-        "the wrench are exchanged, or moments have the other sign. Check --sensor and "
-        "the URDF"
+        "the wrench are exchanged, moments have the other sign, or the sole is another "
+        "link. Check --sensor, --foot and the URDF"
     ]
 
 
-def path_warnings(way: Array, axes: Array) -> list[str]:
+def path_warnings(trial: str, way: Array, axes: Array) -> list[str]:
     """Warn if the path of a stroke deviates from the stated direction or plane.
 
     Args:
+        trial: its name.
         way: positions of the pressed foot in one stroke [m], shape (n, 3).
         axes: rows x_T, y_T, z_T, shape (3, 3).
     """
@@ -103,14 +104,14 @@ def path_warnings(way: Array, axes: Array) -> list[str]:
         return []
     warnings: list[str] = []
     for option, limit, other in (
-        ("--along or --heading", HEADING, aside),
-        ("--normal or --incline", INCLINE, above),
+        ("--along", HEADING, aside),
+        ("--normal", INCLINE, above),
     ):
         angle = float(np.degrees(np.arctan(np.polyfit(ahead, other, 1)[0])))
         deviation = length * np.tan(np.radians(abs(angle)))
         if abs(angle) > limit and deviation > UNEVEN:
             warnings.append(
-                f"the foot's path is {angle:+z.1f} degrees off {option} "
+                f"{trial}: the foot's path is {angle:+z.1f} degrees off {option} "
                 f"(limit {limit:g})"
             )
     return warnings

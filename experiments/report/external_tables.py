@@ -7,8 +7,7 @@ import numpy as np
 
 from acquisition.errors import SettingsError
 from analysis.data.series import TractionSeries
-from analysis.logs.record import read_record
-from analysis.report.section import ReportTable
+from analysis.logs.record import ImportRecord, read_record
 from analysis.report.sections.imported import import_tables
 from analysis.study.study import Study, StudyOptions, notes_of_tables, run_study
 from experiments.operator.console import WARNING, Console
@@ -22,6 +21,7 @@ from experiments.report.study_report import (
 )
 
 Trials = Mapping[str, Sequence[TractionSeries]]
+_TENSION = 0.5  # share of negative rows above which F_n has the wrong sign
 
 
 def report_tables_of_trials(
@@ -50,8 +50,10 @@ def report_tables_of_trials(
         choice.series(next(iter(trials.values()))[0])
     is_simulated = _is_simulated(trials)
     _refuse_repeated(trials)
+    _refuse_tension(trials)
     require_folder(out)
-    notes = notes_of_tables(trials)
+    imports = _import_records(files)
+    notes = [*_import_notes(imports), *notes_of_tables(trials)]
     for note in notes:  # before the work: a wrong unit shows here
         console.say(f"{WARNING} {note}")
     count = sum(len(series) for series in trials.values())
@@ -69,7 +71,7 @@ def report_tables_of_trials(
         is_foreign=True,
         trials=trials,
         with_columns=with_columns,
-        tables=_import_tables(files),
+        tables=[t for record in imports.values() for t in import_tables(record)],
     )
     page = report_study(reported, out, request, console)
     for note in study.groups:
@@ -108,11 +110,37 @@ def require_samples(study: Study) -> None:
     )
 
 
-def _import_tables(files: Sequence[Path]) -> list[ReportTable]:
-    """Tables on the import, from the folders of imported trials."""
+def _import_records(files: Sequence[Path]) -> dict[Path, ImportRecord]:
+    """Records of the imports that made the trials, by folder."""
     folders = dict.fromkeys(path if path.is_dir() else path.parent for path in files)
-    records = [read_record(folder) for folder in folders]
-    return [t for record in records if record for t in import_tables(record)]
+    records = {folder: read_record(folder) for folder in folders}
+    return {folder: record for folder, record in records.items() if record}
+
+
+def _import_notes(records: Mapping[Path, ImportRecord]) -> list[str]:
+    return [
+        f"{folder}: its import gave {len(record.warnings)} warnings, see Imported in "
+        f"the report; the first: {record.warnings[0]}"
+        for folder, record in records.items()
+        if record.warnings
+    ]
+
+
+def _refuse_tension(trials: Trials) -> None:
+    """Refuse a trial whose normal force is negative in most rows.
+
+    Raises:
+        SettingsError: F_n has the sign of tension.
+    """
+    for series in (trial for group in trials.values() for trial in group):
+        present = series.F_n[np.isfinite(series.F_n) & (series.F_n != 0.0)]
+        negative = float(np.mean(present < 0.0)) if present.size else 0.0
+        if negative > _TENSION:
+            raise SettingsError(
+                f"{series.terrain} {series.name}: F_n is negative in {negative:.0%} of "
+                "the rows.",
+                hint="Compression is positive: --negate F_n turns its sign.",
+            )
 
 
 def _refuse_repeated(trials: Trials) -> None:

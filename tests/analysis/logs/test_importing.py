@@ -102,6 +102,8 @@ def test_checks_confirm_correct_statements(imported):
         ({"tare": np.array([3.0, -7.0, 9.0, 0, 0, 0])}, "the free foot reads 2.7 N"),
         ({"along": np.array([1.0, 0.2, 0.0])}, "degrees off --along"),
         ({"normal": np.array([0.2, 0.0, 1.0])}, "degrees off --normal"),
+        ({"normal": np.array([0.035, 0.0, 1.0])}, "--normal is 2.0 degrees off"),
+        ({"lag": 0.4}, "--lag 400 ms: the clocks are"),
     ],
 )
 def test_a_check_that_disagrees_is_reported_and_not_applied(
@@ -192,7 +194,7 @@ def test_a_tare_may_be_six_numbers(imported):
 
 def test_slow_joint_states_are_refused_unless_means_are_requested(imported):
     stroke_log = StrokeLog(joint_rate=40.0)
-    with pytest.raises(SettingsError, match=r"has 40\.0 Hz, slips need"):
+    with pytest.raises(SettingsError, match=r"has 40\.0 Hz, the least is 50 Hz"):
         imported(stroke_log)
     assert any(
         "slips are not seen" in w for w in imported(stroke_log, is_slow=True).warnings

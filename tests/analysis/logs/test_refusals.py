@@ -36,7 +36,7 @@ ESTABLISHED_BY = {
         "--lag {} ms is beyond {} ms.": "the number stated",
         "--tare {}:{} holds {} readings.": "rows with a reading between both times",
         "--trials {}:{} holds {} rows.": "rows between both times",
-        "{} has {} Hz, slips need {} Hz.": "the median step of its times",
+        "{} has {} Hz, the least is {} Hz.": "the median step of its times",
     },
     "leg_record": {
         "this is a trial of Traction: report, fit and export read it.": "a topic of "
@@ -92,14 +92,14 @@ ESTABLISHED_BY = {
         "joint {} has no axis": "an axis shorter than 1e-6",
         "joint {} is {}": "its type is none that one number places",
         "joint {} mimics {}": "its element mimic",
-        "joint {}: its links do not form a tree": "a link is missing, or is a child "
-        "twice",
+        "joint {}: no link {}": "no link has that name",
         "joint {}: {} is {}": "the text is not three finite numbers within 1 km",
+        "link {} is the child of {} and {}": "the second joint with that child",
         "link {} is its own parent": "the way up from it comes back to it",
         "no joint moves between the base and {}": "every joint on the way is fixed",
         "no link {} for the {}.": "no link has that name",
         "over {} elements": "the count",
-        "{} links without a parent, one is the base": "the count",
+        "{} links without a parent, not one: {}": "links that are no child",
         "{}, 1 to {} links can be used": "the counts of links and joints",
         "{}.": "the sentence of the caller",
     },

@@ -56,13 +56,17 @@ def test_urdf_kinematics_agree_with_the_arm_model():
         (b"<sdf/>", "its element is 'sdf', not robot"),
         (
             chain(("j", "fixed", "a", "b", ""), ("k", "fixed", "c", "b", "")),
-            "not form a tree",
+            "link b is the child of j and k",
         ),
+        (chain(("j", "fixed", "a", "z", ""), links="ab"), "joint j: no link z"),
         (
             chain(("j", "fixed", "a", "b", ""), ("k", "fixed", "b", "a", "")),
             "own parent",
         ),
-        (chain(("j", "fixed", "a", "b", "")), "2 links without a parent"),
+        (
+            chain(("j", "fixed", "a", "b", "")),
+            "2 links without a parent, not one: a, c",
+        ),
         (
             chain(("j", "fixed", "a", "b", '<origin xyz="1 nan 0"/>'), links="ab"),
             "xyz is '1 nan 0'",

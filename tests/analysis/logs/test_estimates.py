@@ -1,0 +1,28 @@
+"""Estimates from a log: a quiet foot is found whatever the sensor's filter."""
+
+import numpy as np
+import pytest
+
+from analysis.logs.estimates import find_quiet
+
+RATE = 500.0
+T = np.arange(0.0, 12.0, 1.0 / RATE)
+IS_LIFTED = T < 5.0
+HEIGHT = np.where(IS_LIFTED, 0.05, 0.0)
+
+
+def readings(cut_off):
+    """White noise of 0.05 N through a first-order low-pass, and a load from 5 s on."""
+    white = np.random.default_rng(1).normal(0.0, 0.05, (len(T), 6))
+    share = 1.0 if cut_off is None else 1.0 - np.exp(-2 * np.pi * cut_off / RATE)
+    noise, last = np.empty_like(white), np.zeros(6)
+    for k, row in enumerate(white):
+        noise[k] = last = last + share * (row - last)
+    return noise + np.where(IS_LIFTED, 0.0, 8.0 + np.sin(20.0 * T))[:, None]
+
+
+@pytest.mark.parametrize("cut_off", [None, 50.0, 20.0, 10.0])
+def test_a_quiet_foot_is_found_behind_any_filter(cut_off):
+    quiet = find_quiet(T, readings(cut_off), HEIGHT)
+    assert quiet[IS_LIFTED].mean() > 0.9
+    assert not quiet[~IS_LIFTED].any()
