@@ -31,7 +31,10 @@ from analysis.logs.sqlite_log import SqliteLog, wal_of
 
 _SUFFIXES = (".mcap", ".db3", ".bag", ".mcap.zstd", ".db3.zstd")
 _MOST_FILES = 200
-_FORMATS = "Give an .mcap, a folder or .db3 of rosbag2, or a ROS 1 .bag."
+_FORMATS = (
+    "Give an .mcap, a folder or .db3 of rosbag2, or a ROS 1 .bag. Tables are read by: "
+    "traction fit FILE."
+)
 
 
 @contextmanager

@@ -34,6 +34,7 @@ from experiments.session.sidecar import Attempt
 
 JOURNAL_FILE = "events.jsonl"
 SUMMARY_FILE = "session.json"  # written after each line of the journal
+_PACKAGE = "datapackage.json"  # in a folder of tables
 FOLDS = ".folds"  # in the data folder: finished folds, so that a study resumes
 _FOLDER = re.compile(
     r"^(?P<date>\d{4}-\d\d-\d\d)_(?P<id>S\d{3,})_(?P<terrain>(?:[A-Za-z0-9+-]|\.\d)+)"
@@ -199,6 +200,11 @@ def find_session(data: Path, name: str) -> SessionFolder:
             f"{name} is a file, and no session.",
             hint=_file_hint(Path(name)),
         )
+    if os.path.isfile(os.path.join(name, _PACKAGE)):  # noqa: PTH113, PTH118 - as above
+        raise SessionError(
+            f"{name} is a folder of tables, and no session.",
+            hint=f"traction fit {name}",
+        )
     known = " ".join(s.id for s in list_sessions(data)) or "none yet"
     raise SessionError(
         f"There is no session {name!r} in {data / 'sessions'}.",
@@ -210,7 +216,7 @@ def _file_hint(path: Path) -> str:
     """Advice for a file given in place of a session."""
     session = _session_at(path.absolute().parent.parent)
     if session is not None and path.suffix == ".mcap":
-        return f"Name its session: {session.id}; replay takes the trial beside it."
+        return f"Name its session: {session.id}; traction replay also takes the trial."
     if path.suffix == ".mcap":
         return "A trial is read where it was recorded, in the folder of its session."
     return "Tables are read by: traction fit FILE."

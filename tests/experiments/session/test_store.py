@@ -223,6 +223,14 @@ def test_a_file_given_as_a_session_is_refused_with_a_hint(tmp_path):
         assert hint in caught.value.hint
 
 
+def test_a_folder_of_tables_given_as_a_session_is_refused_with_a_hint(tmp_path):
+    (tmp_path / "gravel").mkdir()
+    (tmp_path / "gravel" / "datapackage.json").write_text("{}")
+    with pytest.raises(SessionError, match="is a folder of tables") as caught:
+        find_session(tmp_path, str(tmp_path / "gravel"))
+    assert caught.value.hint == f"traction fit {tmp_path / 'gravel'}"
+
+
 @pytest.mark.parametrize("terrain", ["G12.5dt", "G12dt+10", "B.0"])
 @pytest.mark.parametrize("is_simulated", [True, False])
 def test_a_terrain_name_with_signs_and_points_is_read_from_the_folder(
