@@ -106,7 +106,10 @@ def _is_removable(statement: ast.stmt) -> bool:
 
 
 def _skipped(tree: ast.Module) -> set[int]:
-    """Return the ids of nodes not to mutate: annotations and formatted messages."""
+    """Return the ids of the nodes that are not mutated.
+
+    These are annotations, decorators, formatted messages and times set to 0 ns.
+    """
     hidden: set[int] = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.JoinedStr) or _is_zero_time(node):

@@ -49,7 +49,7 @@ def add_global_options(
 
 
 def whole_number(text: str) -> int:
-    """Parse a seed.
+    """Parse a whole number >= 0.
 
     Raises:
         ArgumentTypeError: `text` is no whole number of at least 0.
@@ -180,7 +180,7 @@ def add_covariate_option(parser: ArgumentParser, columns: str) -> None:
 
 
 def add_table_options(parser: ArgumentParser) -> None:
-    """Declare the options for tables of other programs."""
+    """Declare the options for external tables."""
     group = parser.add_argument_group("tables")
     group.add_argument(
         "--columns",

@@ -37,7 +37,8 @@ from acquisition.devices import MotorChange, PositionJump
 class Action(Enum):
     """Reaction to a fault, in order of severity.
 
-    END_TRIAL ends a trial and leaves the state of the arm; the console requests hold.
+    END_TRIAL ends the trial and does not change the arm's state; the console then
+    requests hold.
     """
 
     NONE = "none"
@@ -51,7 +52,7 @@ _SEVERITY = {action: severity for severity, action in enumerate(Action)}
 
 
 class Fault(StrEnum):
-    """Reason of a stop; the value is its name in recordings and messages."""
+    """Reason for a stop; the value is its name in recordings and messages."""
 
     E_STOP = "estop"
     PENDANT_IDLE = "pendant-idle"

@@ -25,7 +25,7 @@ class RealtimeRequest:
 
     Attributes:
         priority: SCHED_FIFO priority, 0 = normal scheduling.
-        core: core to be bound to; None = any.
+        core: core to bind to; None = any.
         nice: nice value for normal scheduling.
         is_locked: lock all memory and disable the garbage collector.
         is_awake: forbid deep sleep states of the processors while the process lives;

@@ -34,7 +34,7 @@ _ARM_MODEL = "arm_model.toml"
 ATTACHMENTS = (_CALIBRATION, _TERRAIN, _ARM_MODEL)  # all three are required
 _LONGEST_AGE = 0.1  # s; time stamps further apart are ignored
 _LARGEST_ANGLE = 10.0  # rad, beyond every joint stop
-_LONGEST_NUMBER = 20  # digits of 64 bits
+_LONGEST_NUMBER = 20  # digits of a 64-bit integer
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,7 +38,7 @@ class RigBackend(Protocol):
     def ask(self, request: Request[Answer]) -> Answer:
         """Send a request of `experiments.rig.requests` to arm or sensor.
 
-        Only while the loop does not run; raises the errors of the request.
+        Allowed only while the loop is stopped; raises the errors of the request.
         """
         ...
 

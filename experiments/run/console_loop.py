@@ -57,7 +57,7 @@ _PAUSE_AFTER_NS = 2_000_000_000  # idle time at the other prompts
 _PAUSED_TICKS = 50  # real ticks per simulated tick while paused
 _SLOW = 0.95  # simulation speed below which the screen warns, 1 = real time
 _STAND_TOLERANCE = 0.1  # rad
-_SETTLE_SECONDS = 0.3  # s, time to rest of a holding arm
+_SETTLE_SECONDS = 0.3  # s until an arm in hold stands still
 _SUPPORT = "Support the arm: it goes idle and sinks slowly. [i]dle"
 _LAY_DOWN = "Lay the foot onto its stand: the arm goes idle and sinks slowly. [i]dle"
 _NO_ANSWER = f"No answer for {LAY_DOWN_SECONDS:.0f} s: the arm goes idle. Support it."
@@ -301,7 +301,7 @@ class ConsoleLoop:
         """Run slow `work` in a thread while the console keeps its heartbeat.
 
         Raises:
-            Exception: that of `work`.
+            Exception: whatever `work` raises.
         """
         if self.rig.is_stepped:
             return work()

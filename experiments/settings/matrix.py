@@ -142,7 +142,7 @@ class TerrainRow(SettingsSection):
             [degrees].
         push_deg: direction of the push against x_T [degrees]: 0 = toward the base, 180
             = away from it, from the near end.
-        start_q: joints with the foot at the far end [rad]; None = computed.
+        start_q: joint angles with the foot at the far end [rad]; None = computed.
         place: place of the container in rig.toml; None = its own.
         taught: file of the taught `place`; None = not taught.
         factors: values by name of the factor; None = does not apply.

@@ -16,7 +16,7 @@ class StatedPlace(SettingsSection):
         incline_deg: incline of the container, positive if its far end is high
             [degrees].
         travel: length of a trial [m].
-        start: joints with the foot at the far end [rad]; left out: computed.
+        start: joint angles with the foot at the far end [rad]; left out: computed.
         calibration: file of `traction calibrate terrain`.
         taught: file of `traction teach`, which states all of these.
     """
@@ -47,7 +47,7 @@ class TaughtPlace(TomlFile):
         heading_deg: direction from the base to the container [degrees].
         incline_deg: incline of the line between the two ends [degrees].
         travel: length of a trial [m].
-        start: joints with the foot at the far end [rad].
+        start: joint angles with the foot at the far end [rad].
         foot: foot with which it was touched.
         arm: serial numbers of the arm's pucks, joints 1 to 7.
         measured_utc: time of the measurement.

@@ -28,7 +28,7 @@ class Measurement:
         device_us: the device's clock [us], not wrapped.
         number: counter of frames since power-on.
         has_skipped: the previous sample could not be sent.
-        temperature: [degrees Celsius].
+        temperature: temperature of the device [degrees Celsius].
     """
 
     wrench: Wrench
@@ -43,13 +43,13 @@ class Firmware(Protocol):
     """Commands and frames of one vendor.
 
     Attributes:
+        drops_damaged_frames: the transport drops damaged frames (UDP checksum).
         baudrate: speed of the serial line [bit/s].
         schedule: sample times; None = not streaming. Assigning a new object restarts
             the stream.
         on_since_ns: time of power-on or of its last reset.
         clock_rate: rate of the device's clock, 1 = exact.
         frame_size: size of a frame [bytes].
-        drops_damaged_frames: the transport drops damaged frames (UDP checksum).
     """
 
     drops_damaged_frames: bool

@@ -109,7 +109,7 @@ PD_TORQUE_LIMIT = np.array([25.0, 20.0, 15.0, 15.0, 5.0, 5.0, 5.0])  # N m, PD p
 
 @dataclass(frozen=True, slots=True)
 class JointMove:
-    """Straight trajectory from `start` to `goal` [rad], shapes (7,).
+    """Straight joint-space trajectory from `start` to `goal` [rad], shapes (7,).
 
     The joint with the longest travel has a trapezoidal speed, the others in proportion.
     """

@@ -30,7 +30,7 @@ def current_inputs(
     Args:
         rig: the rig with its settings and calibrations.
         puck_properties: properties of pucks 1 to 7; () = not read.
-        info: result of the start; None = not started.
+        info: result of the arm's start-up; None = not started.
         sensor: identity of the wrist sensor; None = not opened.
     """
     section = rig.settings.rig

@@ -123,7 +123,7 @@ def test_a_saturated_sensor_ends_a_trial_after_its_duration():
     beyond = load(is_saturated=True)
     verdict, cycle = follow([beyond] * 100)
     assert (verdict.fault, verdict.action) == (Fault.FT_SATURATED, Action.END_TRIAL)
-    # It may last for its whole time; the first cycle beyond ends the trial.
+    # Tolerated up to its limit; the first cycle beyond it ends the trial.
     assert cycle == LIMITS.ft_saturated_ms * NS_PER_MS // PERIOD_NS + 1
     assert follow([beyond] * 100, is_recording=False)[0] is OK
     assert follow(([beyond] * 50 + [load()]) * 4)[0] is OK
@@ -179,7 +179,7 @@ def test_a_foot_that_moves_less_than_the_limit_is_at_rest(direction, share, faul
 
 @pytest.mark.parametrize("cycles", [100, 300])
 def test_a_force_on_a_moving_foot_is_not_growth(cycles):
-    """Even with a very low limit of growth."""
+    """The growth limit is almost zero: only the motion prevents the fault."""
     limits, state = replace(LIMITS, contact_growth=0.1), ContactState()
     for cycle in range(cycles):
         seen = load(20.0 + 0.2 * cycle, sole=(0.003 * cycle, 0.0, 0.0))

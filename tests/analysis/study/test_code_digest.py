@@ -122,7 +122,7 @@ def test_a_corrected_formula_is_refitted(copy, tmp_path):
 
     first, errors = fitted()
     assert first == len(errors) > 1
-    assert fitted() == (1, errors)  # one word of progress: all of them are kept
+    assert fitted() == (1, errors)  # one progress call: all are stored
     path = copy / "analysis" / "tustin" / "model.py"
     formula, right = path.read_text(), "stribeck_power(np.abs(v_t), p.v_s,"
     assert right in formula

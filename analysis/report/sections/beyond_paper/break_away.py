@@ -71,12 +71,12 @@ class TerrainBreakAway:
 
     @property
     def loads(self) -> Array:
-        """Normal forces of curves [N], over the range without extrapolation."""
+        """Normal forces at which curves are drawn [N], without extrapolation."""
         return np.linspace(*self.model.loads, _POINTS)
 
     @property
     def forces(self) -> Array:
-        """Traction forces of curves [N], from zero to beyond every peak."""
+        """Traction forces at which curves are drawn [N], from zero to the largest."""
         most = max([self.model.forces[1], *self.peaks.tolist()])
         return np.linspace(0.0, most, _POINTS)
 
@@ -104,7 +104,7 @@ class TerrainBreakAway:
         return pit_limit(self.model.slips)
 
     def motion_quantile(self, share: float) -> float | None:
-        """Return the quantile of the force in motion [N]."""
+        """Return the quantile of F_t in motion [N]; None without `motion`."""
         from scipy.special import ndtri
 
         if self.motion is None:
