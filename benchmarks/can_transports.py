@@ -126,7 +126,7 @@ def library_ends() -> Ends:
 
 def measure(cycles: int) -> list[TransportCost]:
     """Return the cost of each transport over `cycles` paced cycles."""
-    request(RealtimeRequest(is_awake=True))
+    request(RealtimeRequest(limit_wakeup_latency=True))
     transports = {"kernel socket": kernel_ends(), "python-can": library_ends()}
     next_ns = time.monotonic_ns()
     gc.collect()

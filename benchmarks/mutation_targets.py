@@ -566,8 +566,9 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): "clipping leaves values within the limits unchanged",
     (
         "wam/calibration/poses.py",
-        "heights = np.min([lowest(model, drawn + side) for side in sides], axis=0) -> "
-        "heights = np.min([lowest(model, drawn - side) for side in sides], axis=0)",
+        "heights = np.min([lowest_height(model, drawn + side) for side in sides], "
+        "axis=0) -> heights = np.min([lowest_height(model, drawn - side) for side in "
+        "sides], axis=0)",
     ): "the sides are the same on both sides",
 }
 # NaN makes any sum NaN, whatever the signs.

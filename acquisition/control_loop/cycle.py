@@ -333,7 +333,7 @@ class Cycle:
         )
         if excess is None or verdict.action is not _NONE:
             return verdict
-        return verdict_for(Fault.PROOF_MOTION, excess)
+        return verdict_for(Fault.POWERED_TEST_MOTION, excess)
 
     def _act_on(self, verdict: GuardVerdict, reading: ArmReading) -> None:
         """Enter the state demanded by the verdict and latch it."""

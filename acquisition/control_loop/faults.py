@@ -71,7 +71,7 @@ class Fault(StrEnum):
     ACTIVATION_MOTION = "activation-motion"
     HOLD_MOTION = "hold-motion"
     DAMP_MOTION = "damp-motion"
-    PROOF_MOTION = "proof-motion"
+    POWERED_TEST_MOTION = "proof-motion"
     KINETIC_ENERGY = "kinetic-energy"
     NOT_A_NUMBER = "not-a-number"
     JOINT_LIMIT = "joint-limit"
@@ -137,7 +137,7 @@ FAULTS: Mapping[Fault, FaultSpec] = {
     Fault.ACTIVATION_MOTION: FaultSpec(_IDLE, MotionExcess, ends_session=True),
     Fault.HOLD_MOTION: FaultSpec(_IDLE, MotionExcess, ends_session=True),
     Fault.DAMP_MOTION: FaultSpec(_IDLE, MotionExcess, ends_session=True),
-    Fault.PROOF_MOTION: FaultSpec(_IDLE, MotionExcess, ends_session=True),
+    Fault.POWERED_TEST_MOTION: FaultSpec(_IDLE, MotionExcess, ends_session=True),
     Fault.KINETIC_ENERGY: FaultSpec(_IDLE, MotionExcess, ends_session=True),
     Fault.NOT_A_NUMBER: FaultSpec(_IDLE, ends_session=True),
     Fault.JOINT_LIMIT: FaultSpec(_DAMP, JointExcess),

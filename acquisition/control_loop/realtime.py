@@ -27,16 +27,16 @@ class RealtimeRequest:
         priority: SCHED_FIFO priority, 0 = normal scheduling.
         core: core to bind to; None = any.
         nice: nice value for normal scheduling.
-        is_locked: lock all memory and disable the garbage collector.
-        is_awake: forbid deep sleep states of the processors while the process lives;
-            skipped if the kernel has no such interface.
+        lock_memory: lock all memory and disable the garbage collector.
+        limit_wakeup_latency: forbid deep idle states of the processors while
+            the process lives; skipped if the kernel has no such interface.
     """
 
     priority: int = 0
     core: int | None = None
     nice: int = 0
-    is_locked: bool = False
-    is_awake: bool = False
+    lock_memory: bool = False
+    limit_wakeup_latency: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,12 +76,12 @@ def request(wanted: RealtimeRequest) -> list[Grant]:
         )
     if wanted.nice:
         grants.append(_try(f"nice {wanted.nice}", lambda: _nice(wanted.nice)))
-    if wanted.is_locked:
+    if wanted.lock_memory:
         gc.collect()
         gc.freeze()
         gc.disable()
         grants.append(_try("memory locked", _lock_memory))
-    if wanted.is_awake and _LATENCY.exists():
+    if wanted.limit_wakeup_latency and _LATENCY.exists():
         grants.append(_try("processors awake", _stay_awake))
     return grants
 

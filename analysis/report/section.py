@@ -20,7 +20,7 @@ class ReportSection(Enum):
     PAPER = "The paper's table and figures"
     BEYOND = "Beyond the paper"
     HEALTH = "Rig health"
-    REACH = "Measurement limits"
+    MEASUREMENT_LIMITS = "Measurement limits"
     IMPORTED = "Imported"
     ORIGIN = "Analysis settings and provenance"
 

@@ -141,7 +141,7 @@ class Scene:
                 return number
 
     def _typed(self) -> str:
-        while (line := self.console_loop.line(_NO_TRIAL)) is None:
+        while (line := self.console_loop.poll_note(_NO_TRIAL)) is None:
             self.console.panel([f" {self.console_loop.operator.draft}"])
         self.console.end_panel()
         if self.console_loop.stop.count:

@@ -152,7 +152,7 @@ def _predicted(scores: NDArray[np.float64]) -> ReportTable:
         [_scored(name, scores[:, k]) for k, name in enumerate(("F_t", "F_n"))],
         note="Simulated trials only. The uncertainty is the one by the changes between "
         "tares, which a real session has too; where it is right, the rms is 1.",
-        section=ReportSection.REACH,
+        section=ReportSection.MEASUREMENT_LIMITS,
     )
 
 
@@ -176,7 +176,7 @@ def _measured(errors: Mapping[str, list[tuple[str, TruthErrors]]]) -> ReportTabl
             for name, error in of_terrain
         ],
         note="Simulated trials only; after the same smoothing on both.",
-        section=ReportSection.REACH,
+        section=ReportSection.MEASUREMENT_LIMITS,
     )
 
 
@@ -195,7 +195,7 @@ def _recovered(
         note="A simulated plate follows eq. (1) with δ_s = 2 and a static force that "
         "grows with F_n. A bed of stones has no Tustin parameters: its own are given, "
         "and only curves can be compared. In brackets the 95% interval.",
-        section=ReportSection.REACH,
+        section=ReportSection.MEASUREMENT_LIMITS,
     )
 
 

@@ -75,7 +75,9 @@ class ControlWorker:
         self._is_orphaned = False
         signal.signal(signal.SIGTERM, self._note_orphaned)
         core = settings.get("core")
-        rights = RealtimeRequest(CONTROL_PRIORITY, core, is_locked=True, is_awake=True)
+        rights = RealtimeRequest(
+            CONTROL_PRIORITY, core, lock_memory=True, limit_wakeup_latency=True
+        )
         self._grants = request(rights)
 
     def serve(self) -> None:

@@ -141,7 +141,7 @@ class ConsoleLoop:
         """Remaining time to undo the newest verdict [s], 0 = expired."""
         return max(0.0, (self.undo_until_ns - self.rig.clock.now_ns()) * 1e-9)
 
-    def line(self, name: TrialName) -> str | None:
+    def poll_note(self, name: TrialName) -> str | None:
         """Advance by 20 ms; return the note, "" if cancelled, None while it is typed.
 
         Raises:
@@ -208,7 +208,7 @@ class ConsoleLoop:
         """
         control = self.loop_client.status
         if self.loop_client.is_news(control):
-            raise self._fault(control)
+            raise self._report_faults(control)
 
     def _raise_fault(self, prompt: Prompt) -> None:
         """Raise the guard's strictest verdict, unless reported and persistent."""
@@ -218,11 +218,11 @@ class ConsoleLoop:
         if control.verdict is None:
             return
         is_reported = control.verdict.fault in self._reported
-        fault = self._fault(control)
+        fault = self._report_faults(control)
         if not is_reported:
             raise fault
 
-    def _fault(self, control: ControlStatus) -> ArmFaultError:
+    def _report_faults(self, control: ControlStatus) -> ArmFaultError:
         """Return the strictest active verdict as an error; print the others."""
         strictest, *others = control.active_verdicts
         for verdict in others:
@@ -270,7 +270,7 @@ class ConsoleLoop:
         control = self.loop_client.status
         if control.verdict is None:
             return verdict
-        strictest = self._fault(control).verdict
+        strictest = self._report_faults(control).verdict
         is_worse = strictest.strictness > verdict.strictness
         worst, milder = (strictest, verdict) if is_worse else (verdict, strictest)
         if milder.fault is not worst.fault:
@@ -408,5 +408,5 @@ class ConsoleLoop:
             self.loop_client.advance(TICK)
             control = self.loop_client.status
             if self.loop_client.is_news(control):
-                self.console.problem(fault_words(self._fault(control).verdict))
+                self.console.problem(fault_words(self._report_faults(control).verdict))
         return is_confirmed

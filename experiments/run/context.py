@@ -125,7 +125,7 @@ class RunServices:
 
     def report_error(self, error: TractionError) -> None:
         """Print an error, and how many trials are safe."""
-        self.console.problem(f"{error} {self.journal.saved()}")
+        self.console.problem(f"{error} {self.journal.saved_message()}")
 
     def watch_foot(self) -> FootKeys:
         """Return a detector of double taps of the foot, if enabled in rig.toml."""
@@ -194,7 +194,7 @@ class RunContext(RunServices):
         if self.journal.state.is_complete:  # neither a trial nor `resume` follows
             prompt = None if context.prompt is Prompt.READY else context.prompt
             context = replace(context, prompt=prompt, command=REPORT)
-        return fault_text(verdict, context, self.journal.saved())
+        return fault_text(verdict, context, self.journal.saved_message())
 
     def clear_faults(self, fault: ArmFaultError) -> None:
         """Report a fault that leaves the arm holding, and clear it.

@@ -54,7 +54,9 @@ class SessionRunner:
             reason = "complete" if context.journal.state.is_complete else "unfinished"
         except StopRequestedError:
             code, reason = CATALOGUE["interrupted"].exit_code, "unfinished"
-            context.say(CATALOGUE["interrupted"].text({}, context.journal.saved()))
+            context.say(
+                CATALOGUE["interrupted"].text({}, context.journal.saved_message())
+            )
         except ArmFaultError as fault:
             code, reason = 4, fault.verdict.reason
             context.state.fault_context = replace(
@@ -139,7 +141,7 @@ class SessionRunner:
         context = self._context
         log = context.metadata.folder.path / "log.txt"
         details = {"error": trace.splitlines()[-1], "rest": arm_text, "log": log}
-        message = CATALOGUE["bug"].text(details, context.journal.saved())
+        message = CATALOGUE["bug"].text(details, context.journal.saved_message())
         context.console.problem(message)
         write_text(log, trace)
 

@@ -151,7 +151,7 @@ def take_note(services: RunServices, name: TrialName, *, is_on_trial: bool) -> N
     services.say(NOTE_KEYS)
     console_loop.show(lambda _: [f"Note: {services.operator.draft}▏", NOTE_KEYS])
     try:
-        while (text := console_loop.line(name)) is None:
+        while (text := console_loop.poll_note(name)) is None:
             pass
     finally:
         console_loop.show(None)

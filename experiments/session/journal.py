@@ -40,21 +40,21 @@ class Journal:
         if reason:
             raise SessionError(f"{self.folder.id}: {event} is refused, {reason}.")
         if event == Event.TRIAL_KEPT or details.get("verdict") == KEEP:
-            entry |= self._sums(entry)
+            entry |= self._checksum_and_size(entry)
         self.folder.append_event(entry)
         self.state = apply(self.state, entry)
         derive(self.folder, self.state)
 
-    def _sums(self, entry: dict[str, object]) -> dict[str, object]:
-        """Checksum and size of the trial that an event keeps."""
+    def _checksum_and_size(self, entry: dict[str, object]) -> dict[str, object]:
+        """Checksum and size of the trial that an event keeps; empty if none."""
         after, before = apply(self.state, entry).kept_trials, self.state.attempts
         sidecars = [
             sidecar_of(self.folder, kept) for kept in after if kept not in before
         ]
         return checksum_and_size(sidecars[0]) if sidecars else {}
 
-    def saved(self) -> str:
-        """Message about the trials that are safe on the disk."""
+    def saved_message(self) -> str:
+        """Sentence that states how many trials are safe on disk, and where."""
         kept = len(self.state.kept)
         trials = "1 trial is" if kept == 1 else f"{kept} trials are"
         return f"{trials} safe in {self.folder.path}."

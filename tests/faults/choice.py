@@ -42,7 +42,7 @@ WHY: Mapping[Fault, str] = {
     Fault.ACTIVATION_MOTION: _TORQUES,
     Fault.HOLD_MOTION: _TORQUES,
     Fault.DAMP_MOTION: _TORQUES,
-    Fault.PROOF_MOTION: "nothing is known to bear the arm but its stops",
+    Fault.POWERED_TEST_MOTION: "nothing is known to bear the arm but its stops",
     Fault.KINETIC_ENERGY: _TORQUES,
     Fault.NOT_A_NUMBER: "there is no torque to send",
     Fault.JOINT_LIMIT: _BEYOND,
@@ -71,7 +71,7 @@ _ROWS = {
     Fault.MOTOR_STALLED: "stuck-motor-2",
     Fault.ENCODER_FROZEN: "",
     Fault.HOLD_MOTION: "",
-    Fault.PROOF_MOTION: "",
+    Fault.POWERED_TEST_MOTION: "",
     Fault.CONTACT_MOVE: "contact-force",
 }
 _WORDS = {

@@ -52,7 +52,7 @@ class Emulator:
         command = _CONFIG_READ if value is None else _CONFIG_WRITE
         return self.ask(command, struct.pack("<IIi", offset, value or 0, length))
 
-    def word(self, offset, piece=None):
+    def read_register(self, offset, piece=None):
         body = struct.pack("<QQI?3x", _BASE + offset, 0, 8, True)
         return self.ask(_READ, body, piece)
 
@@ -80,7 +80,7 @@ def test_the_device_has_an_identity_and_one_page_of_registers(emulator):
 @pytest.mark.parametrize("piece", [None, 1, 7])
 def test_a_read_request_may_arrive_in_pieces(emulator, piece):
     emulator.config(0x10, 4, _BASE)
-    assert emulator.word(8, piece) == 2**64 - 9
+    assert emulator.read_register(8, piece) == 2**64 - 9
     assert emulator.read == [8]
 
 
@@ -94,7 +94,7 @@ def test_guest_memory_descriptors_are_closed_without_a_reply(emulator):
     os.close(read_end)
 
 
-def test_a_message_of_another_protocol_closes_the_connection():
+def test_an_oversized_message_closes_the_connection():
     emulator = Emulator()
     emulator.link.sendall(_HEAD.pack(_READ, 0, 1 << 20))
     assert emulator.link.recv(1) == b""

@@ -11,7 +11,7 @@ from analysis.report.section import ReportSection, ReportTable
 from analysis.report.sections.rig_health.health import RigTrial
 
 _SATURATED = 1e-9  # share of saturated cycles above which it is reported
-_REACH_NOTE = (
+_LIMITS_NOTE = (
     "Measurable: largest traction within the sensor's ranges, given the lever arm of "
     "the foot; – if the ranges are unknown (if no sample was out of range, it is at "
     "least the largest observed). "
@@ -72,8 +72,8 @@ def limits_table(results: StudyResults) -> ReportTable:
             "drag of the joints [N]",
         ),
         rows,
-        note=_REACH_NOTE,
-        section=ReportSection.REACH,
+        note=_LIMITS_NOTE,
+        section=ReportSection.MEASUREMENT_LIMITS,
     )
 
 
@@ -96,4 +96,4 @@ def _tables(results: StudyResults, _: ReportContext) -> list[ReportTable]:
     return [limits_table(results)] if results.rig else []
 
 
-SECTION = Section(ReportSection.REACH, _tables)
+SECTION = Section(ReportSection.MEASUREMENT_LIMITS, _tables)

@@ -1022,7 +1022,7 @@ def test_a_powered_test_continues_while_the_arm_behaves(proving):
 def test_an_excess_in_a_powered_test_ends_in_idle(proving):
     proving.law.excess = MotionExcess("the travel of joint 4", 0.03, 0.025, "rad")
     proving.run()
-    assert (proving.state, proving.reason) == (ArmState.IDLE, Fault.PROOF_MOTION)
+    assert (proving.state, proving.reason) == (ArmState.IDLE, Fault.POWERED_TEST_MOTION)
     assert proving.cycle.status.verdict.detail == proving.law.excess
 
 

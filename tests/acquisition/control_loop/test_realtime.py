@@ -68,7 +68,7 @@ def test_an_open_descriptor_keeps_processors_awake(tmp_path, monkeypatch):
     real_open = os.open
     monkeypatch.setattr(os, "open", keep)
     monkeypatch.setattr("acquisition.control_loop.realtime._LATENCY", device)
-    (grant,) = request(RealtimeRequest(is_awake=True))
+    (grant,) = request(RealtimeRequest(limit_wakeup_latency=True))
     assert (grant.what, grant.is_granted) == ("processors awake", True)
     assert device.read_bytes() == bytes(4)  # 0 us, as the kernel reads it
     (descriptor,) = opened
@@ -83,7 +83,7 @@ def test_a_refused_sleep_inhibition_is_reported_with_its_requirement(monkeypatch
 
     monkeypatch.setattr(os, "open", refuse)
     monkeypatch.setattr("acquisition.control_loop.realtime._LATENCY", Path(__file__))
-    (grant,) = request(RealtimeRequest(is_awake=True))
+    (grant,) = request(RealtimeRequest(limit_wakeup_latency=True))
     assert not grant.is_granted
     assert "EACCES" in grant.reason
     assert "udev" in grant.reason
@@ -93,4 +93,4 @@ def test_a_kernel_without_sleep_states_needs_no_request(monkeypatch, tmp_path):
     monkeypatch.setattr(
         "acquisition.control_loop.realtime._LATENCY", tmp_path / "nothing"
     )
-    assert request(RealtimeRequest(is_awake=True)) == []
+    assert request(RealtimeRequest(limit_wakeup_latency=True)) == []

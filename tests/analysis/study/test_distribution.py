@@ -118,7 +118,7 @@ def test_crps_equals_its_defining_integral(kind, force):
 
 
 @pytest.mark.parametrize("nu", [np.inf, 4.0])
-def test_a_normal_prediction_has_quantiles_and_a_distribution_function(nu):
+def test_quantiles_of_a_normal_and_a_t_prediction_invert_its_cdf(nu):
     distribution = Prediction(np.array([1.0, 2.0]), np.array([0.5, 2.0]), nu)
     forces = distribution.quantiles(SHARES)
     for share, row in zip(SHARES, forces, strict=True):

@@ -173,7 +173,7 @@ def test_a_module_must_brake_an_arm_without_requests_in_time(braked_ms, is_sound
         (Fault.PENDANT_IDLE, (), False),  # a person pressed Shift-idle
         (Fault.PENDANT_IDLE, ("velocity",), False),
         (Fault.E_STOP, ("heartbeat",), False),  # the positions are lost
-        (Fault.PROOF_MOTION, (), False),
+        (Fault.POWERED_TEST_MOTION, (), False),
     ],
 )
 def test_only_a_heartbeat_fault_counts_as_the_heartbeat(fault, causes, is_heartbeat):

@@ -61,7 +61,7 @@ def test_a_stop_ends_every_prompt_but_the_review():
 def test_a_stop_abandons_a_note():
     loop = make_loop(Keys(lines=["half a no"]))
     loop.stop.request()
-    assert loop.line(NAME) == ""
+    assert loop.poll_note(NAME) == ""
 
 
 def test_a_lost_terminal_is_a_stop():
@@ -225,11 +225,11 @@ def test_a_note_is_shown_as_typed_in_a_paused_simulation(keyboard):
     console.end_panel = lambda: None
     loop.show(lambda _: [loop.operator.draft])
     for _ in range(500):
-        loop.line(NAME)
+        loop.poll_note(NAME)
     shown.clear()
     os.write(keyboard[1], b"wet")
     for _ in range(10):
-        assert loop.line(NAME) is None
+        assert loop.poll_note(NAME) is None
     assert shown[-1] == ["wet"]
 
 

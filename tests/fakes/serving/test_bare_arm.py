@@ -1,4 +1,4 @@
-"""A client that knows only CAN protocol and gravity model moves a served arm."""
+"""A client that knows only the CAN protocol and a gravity model moves a served arm."""
 
 from contextlib import closing
 
@@ -66,7 +66,7 @@ def serve(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_four_joint_arm_reaches_its_goal_under_vendor_control(serve):
+def test_four_joints_reach_their_goal_under_vendor_control(serve):
     arm = serve()
     arm.activate()
     q = arm.client.move(WANTED, MOVE_SECONDS)
