@@ -6,10 +6,8 @@ from typing import Any, NamedTuple, cast
 
 from analysis.data.terrain_kinds import Value
 
-MAX_FACTORS, MAX_NAME_LENGTH = (
-    13,
-    60,
-)  # factors, the foot among them; characters of names and words
+MAX_FACTORS = 13  # the foot among them
+MAX_NAME_LENGTH = 60  # characters of names and words
 _LARGEST = 1e12
 _FEET = {"true": "tread", "false": "bare"}  # as the first recordings state a foot
 FOOT = "foot"

@@ -273,7 +273,7 @@ def _stuck_rows(record: LegRecord, request: ImportRequest) -> Bools:
 
 def _extent(t: Array, losses: Sequence[str]) -> str:
     """The span of the log, and what could not be read of it."""
-    return " ".join([f"The log goes from 0 to {t[-1]:.1f} s.", *losses])
+    return "; ".join([f"The log goes from 0 to {t[-1]:.1f} s", *losses]) + "."
 
 
 def _payload(

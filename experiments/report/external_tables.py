@@ -119,7 +119,7 @@ def _import_records(files: Sequence[Path]) -> dict[Path, ImportRecord]:
 
 def _import_notes(records: Mapping[Path, ImportRecord]) -> list[str]:
     return [
-        f"{folder}: its import gave {len(record.warnings)} warnings, see Imported in "
+        f"{folder}: warnings of its import: {len(record.warnings)}, see Imported in "
         f"the report; the first: {record.warnings[0]}"
         for folder, record in records.items()
         if record.warnings
