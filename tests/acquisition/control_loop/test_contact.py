@@ -280,11 +280,6 @@ def test_a_load_that_grows_as_the_trial_ends_makes_the_arm_hold(bench):
     assert bench.state is ArmState.HOLD
 
 
-def test_a_load_is_not_judged_before_the_first_tare(bench):
-    bench.run(10, force=160.0)
-    assert bench.reason == ""
-
-
 def test_torques_are_sent_for_a_rejected_position_but_not_for_a_missing_one(bench):
     bench.arm.missing = 1
     sent = len(bench.arm.sent)

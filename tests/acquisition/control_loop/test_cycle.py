@@ -512,16 +512,6 @@ def test_a_worse_fault_replaces_the_first(bench):
     assert (bench.state, bench.reason) == (ArmState.DAMP, "overspeed")
 
 
-def test_the_first_of_two_equal_faults_is_reported(bench):
-    bench.enter(ArmState.FLOAT)
-    bench.arm.qd = np.full(7, 1.6)
-    bench.run()
-    bench.arm.qd = np.zeros(7)
-    bench.observer.speed = 2.0
-    bench.run()
-    assert bench.reason == "overspeed"
-
-
 def test_a_lasting_fault_enters_its_state_once(bench):
     bench.enter(ArmState.FLOAT)
     bench.arm.qd = np.full(7, 1.6)

@@ -103,10 +103,6 @@ def test_an_unknown_fault_name_is_refused():
         from_plain(["hold", "no-fault", {}])
 
 
-def test_a_reason_is_the_recorded_name():
-    assert GuardVerdict(Action.HOLD, Fault.FT_STALE).reason == "ft-stale"
-
-
 def test_actions_are_ordered_by_severity():
     order = (Action.NONE, Action.END_TRIAL, Action.HOLD, Action.DAMP, Action.IDLE)
     assert [GuardVerdict(action).severity for action in order] == [0, 1, 2, 3, 4]

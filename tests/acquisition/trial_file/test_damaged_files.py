@@ -284,13 +284,6 @@ def test_fewer_messages_than_announced_are_refused(put, pristine):
         TrialReader(put(resealed(changed))).cycles()
 
 
-def test_a_valid_hand_made_chunk_is_read(put):
-    raw = chunk_content()
-    payload = zstandard.ZstdCompressor().compress(raw)
-    rows = TrialReader(put(with_chunk(payload, len(raw)))).cycles()
-    assert rows.data.tobytes() == CYCLE.template
-
-
 @pytest.mark.parametrize("compression", ["", "lz4", "zstd"])
 def test_a_hand_made_chunk_of_every_compression_is_read(put, compression):
     raw = chunk_content(compression=compression)

@@ -357,11 +357,6 @@ def test_verify_refuses_fewer_than_two_cycles(tmp_path):
         verify_file(sealed_anyway(tmp_path, make_cycles(1)).partial)
 
 
-def test_verify_refuses_an_empty_trial(tmp_path):
-    with pytest.raises(TrialFileError, match="fewer than two"):
-        verify_file(sealed_anyway(tmp_path, make_cycles(0)).partial)
-
-
 def test_verify_refuses_changed_messages(tmp_path):
     writer = sealed_anyway(tmp_path, make_cycles(20))
     writer.counts.messages["/events"] = 1

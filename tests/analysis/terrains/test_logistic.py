@@ -40,13 +40,6 @@ def test_a_weight_of_two_equals_a_repeated_row():
     assert weighted.weights == pytest.approx(doubled.weights, abs=1e-6)
 
 
-def test_separable_rows_end_with_finite_weights():
-    X = np.linspace(-1.0, 1.0, 100)[:, None]
-    model = fit_logistic(X, X[:, 0] > 0.0, np.ones(100))
-    assert np.isfinite(model.weights).all()
-    assert model.probabilities(np.array([[1.0]]))[0] > 0.95
-
-
 def test_a_single_class_gives_an_uninformative_fit():
     X, _ = rows(50)
     with pytest.raises(ValueError, match="one answer"):

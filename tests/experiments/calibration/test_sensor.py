@@ -152,18 +152,6 @@ def test_a_calibrated_foot_turned_in_the_air_shows_no_force(calibrated):
     assert np.linalg.norm(left, axis=1).max() < 0.3
 
 
-def test_an_incline_shows_as_a_force_after_a_tare_at_one_angle():
-    """Why the calibration exists: 10 degrees with 0.45 kg are 0.77 N."""
-    payload = payload_of(
-        Tool(Body(0.1, COM, np.eye(3)), Body(0.45, np.zeros(3), np.eye(3)), np.zeros(3))
-    )
-    level = np.diag([1.0, -1.0, -1.0])
-    c, s = np.cos(np.radians(10.0)), np.sin(np.radians(10.0))
-    inclined = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]) @ level
-    shown = payload.weight(inclined) - payload.weight(level)
-    assert np.linalg.norm(shown[:3]) == pytest.approx(0.77, abs=0.01)
-
-
 @pytest.mark.long
 def test_drift_is_reported_and_refused_unless_forced(tmp_path):
     out = tmp_path / "ft_sensor.toml"

@@ -93,12 +93,6 @@ def test_the_real_rig_without_its_bus_is_a_failed_preflight(tmp_path):
     assert "ARM: not touched." in refusal(done, 3)
 
 
-def test_a_stop_pressed_before_the_start_is_a_failed_preflight(config, tmp_path):
-    done = run_short(config, tmp_path / "data", "TF", 1, "--fault", "estop@T0+0s")
-    assert refusal(done, 3).startswith("The arm is in E-stop")
-    assert not (tmp_path / "data").exists()
-
-
 def test_too_little_disk_space_is_a_failed_preflight(tmp_path):
     config = write_config(tmp_path, rig=("free_disk_gb = 5.0", "free_disk_gb = 1e5"))
     done = run_short(config, tmp_path / "data")

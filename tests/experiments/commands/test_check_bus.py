@@ -33,10 +33,6 @@ def test_an_identifier_is_described(can_id, words):
     assert describe_id(can_id) == words
 
 
-def test_every_identifier_has_a_description():
-    assert all(describe_id(can_id) for can_id in range(0x800))
-
-
 def test_the_load_of_a_bus_follows_from_its_frames():
     traffic = BusTraffic()
     # A cycle of the arm: request, seven positions, two torques, 500 times a second.

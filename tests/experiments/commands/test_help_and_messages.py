@@ -28,8 +28,6 @@ from experiments.rig.build import build_tool
 from experiments.rig.requests import ExchangeTimes
 from experiments.run import ready, runner
 from experiments.run import tare as taring
-from experiments.run.fault_plan import FaultPlan
-from experiments.run.host_faults import COMPUTER_FAULTS
 from experiments.session.data_files import journal_line, parse_line
 from experiments.session.lock import session_lock
 from experiments.session.reducer import replay
@@ -48,11 +46,11 @@ from tests.experiments.program import (
     digest,
     journal,
     only_session,
-    run_short,
     run_watched,
     traction,
     write_config,
 )
+from tests.experiments.run.test_bus_faults import BUS_FAULTS
 from wam.control.controller import FootController
 from wam.driver import property_watch
 
@@ -575,21 +573,13 @@ CASES = {
     "tare-poor": tared(_saturate, words="were flagged during tare"),
     "mounting": Case(_turned_sensor, 3, words="degrees about z"),
     "no-end-tare": Case(_no_end_tare, 0, words="left out as asked."),
-    # faults that end the session; in a trial: test_bus_faults
-    "can-silence": struck("can-silence"),
+    # faults that end the session; those of the bus in a trial: test_bus_faults
     "safety-silent": struck("safety-silent"),
     "replies-late": struck("replies-late", words="Pucks 1,2,3,4,5,6,7 have answered"),
     "position-jump": struck("position-jump"),
     "bus-shared": struck("bus-shared", words="frame 4"),
     "puck-changed": Case(_changed_puck, 4, words="IPNM of puck 3 was 2700"),
-    "puck-silent": struck("puck-silent", words="Puck 3 has not"),
-    "bus-off": struck("bus-off"),
-    "interface-down": struck("interface-down"),
-    "unacknowledged": struck("unacknowledged"),
-    "estop": fault("estop@T2+0.1s", 4, E_STOP, "Stop pressed at 0.1"),
     "pendant-idle": struck("pendant-idle"),
-    "safety-idle": struck("safety-torque", words="torque fault"),
-    "safety-stop": struck("safety-voltage", E_STOP, "voltage fault"),
     "motor-stuck": acted(Prompt.LIFT, _pull_in_vain, 4, "Motor 2 does not turn"),
     "motor-still": acted(Prompt.RECORDING, _stand_still, 4, "(limit 0)"),
     "not-a-number": acted(Prompt.LIFT, _not_a_number, 4),
@@ -657,7 +647,7 @@ OF_THE_FIRST_DAY = {"daily-ahead"}
 
 
 def test_every_row_of_the_catalogue_has_a_case():
-    elsewhere = SHARED_ARM | OF_THE_COMPUTER | OF_THE_FIRST_DAY
+    elsewhere = SHARED_ARM | BUS_FAULTS | OF_THE_COMPUTER | OF_THE_FIRST_DAY
     assert set(CASES) | elsewhere == set(CATALOGUE)
 
 
@@ -679,15 +669,3 @@ def test_a_message_has_its_exit_code_and_earlier_trials_stay_unchanged(scene, na
         network = scene.rig.network
         assert network.safety_mode is case.mode
         assert scene.rig.plant.is_idle  # all windings are shorted
-
-
-@pytest.mark.parametrize("name", sorted(COMPUTER_FAULTS))
-def test_a_planned_fault_of_the_computer_names_its_trial_and_time(name):
-    plan = FaultPlan(name, 3, 1.5)
-    assert plan.to_text() == f"{name}@T3+1.5s"
-
-
-def test_a_new_session_that_another_process_opened_first_is_refused(config, tmp_path):
-    done = run_short(config, tmp_path, "TF", 1, "--fault", "locked")
-    assert done.code == CATALOGUE["locked"].exit_code
-    assert re.match(pattern("locked"), done.err)

@@ -1,14 +1,20 @@
 """`traction init` writes valid settings and overwrites nothing."""
 
+from importlib import resources
+
 import pytest
 
 from experiments.settings.load import load_settings
 from tests.experiments.program import traction
 
 
-def test_both_files_are_valid_as_written(tmp_path):
+def test_both_files_are_valid_and_keep_their_comments(tmp_path):
     done = traction("init", tmp_path / "lab")
     assert done.code == 0, done.err
+    for name in ("rig.toml", "matrix.toml"):
+        shipped = (resources.files("experiments.data") / name).read_text()
+        assert (tmp_path / "lab" / name).read_text() == shipped
+        assert "#" in shipped
     settings = load_settings(tmp_path / "lab" / "rig.toml")
     assert settings.matrix == load_settings(None).matrix
     checked = traction(

@@ -83,23 +83,6 @@ def test_a_signal_ends_the_service_cleanly(serve, tmp_path, number):
     assert not (tmp_path / "bus").exists()
 
 
-def test_a_service_without_stdin_runs_until_a_signal(tmp_path):
-    command = [sys.executable, "-m", "experiments", "fake", "--can"]
-    with subprocess.Popen(
-        [*command, f"traction-fake:{tmp_path}/bus", "--idle-first"],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    ) as process:
-        assert process.stdout.readline().startswith("ready: ")
-        with SocketBus(f"{tmp_path}/bus") as bus:
-            assert ask(bus, 10, b"\x08") == (0x546, "88 00 01 00")
-        process.terminate()
-        assert process.wait(PATIENCE) == 0
-    assert not (tmp_path / "bus").exists()
-
-
 STARTS = {
     "background of a script": "{} </dev/null & echo $!; wait $!",
     "without stdin": "{} <&- & echo $!; wait $!",
@@ -168,16 +151,6 @@ def test_an_interface_that_does_not_exist_is_a_link_error():
     done = traction("fake", "--can", "nothing:can0")
     assert done.code == 4
     assert "nothing:can0 cannot be opened" in done.err
-
-
-def test_an_invalid_script_line_starts_nothing(tmp_path):
-    script = tmp_path / "script"
-    script.write_text("idle\njump\n")
-    where = f"traction-fake:{tmp_path}/bus"
-    done = traction("fake", "--can", where, "--script", script)
-    assert done.code == 2
-    assert "line 2" in done.err
-    assert not (tmp_path / "bus").exists()
 
 
 def test_check_logs_its_bus_and_replay_finds_every_reply(config, tmp_path):

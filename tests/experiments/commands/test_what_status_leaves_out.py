@@ -37,12 +37,6 @@ def test_a_data_folder_without_sessions_is_reported(config, tmp_path):
     assert "no sessions" in status(config, tmp_path).err
 
 
-def test_a_renamed_session_is_reported(config, data):
-    folder = only_session(data)
-    renamed = folder.rename(folder.with_name("my best session"))
-    assert str(renamed) in status(config, data).err
-
-
 def test_a_session_of_an_unknown_terrain_is_reported(config, tmp_path):
     create_session(tmp_path, "MOON", is_simulated=True, utc_ns=0)
     assert "MOON is not a terrain of the matrix" in status(config, tmp_path).err

@@ -36,3 +36,23 @@ def test_every_word_stays_whole_and_in_order(words, width):
 def test_without_a_terminal_a_long_line_stays_one_line(capsys):
     Console().say("word " * 40)
     assert capsys.readouterr().out.count("\n") == 1
+
+
+def test_a_closed_console_is_noticed(monkeypatch):
+    class Closed:
+        def write(self, _):
+            raise BrokenPipeError
+
+        def flush(self):
+            raise BrokenPipeError
+
+        def isatty(self):
+            return False
+
+    monkeypatch.setattr("sys.stdout", Closed())
+    monkeypatch.setattr("experiments.operator.console.discard", lambda _: None)
+    console = Console()
+    assert not console.is_lost
+    console.say("anybody?")
+    assert console.is_lost
+    console.say("nobody")

@@ -15,7 +15,7 @@ from experiments.operator.feedback import (
     build_feedback,
     find_speech,
 )
-from experiments.run.trial import PaceMonitor
+from experiments.run.trial import PACE_LIMIT, PaceMonitor
 from experiments.settings.rig import OperatorSection
 
 
@@ -185,5 +185,5 @@ def test_a_usual_push_with_slips_is_not_too_fast():
 
 
 def test_a_push_is_too_fast_beyond_the_limit_only():
-    assert too_fast([0.19] * 200) == []
-    assert too_fast([0.21] * 200)
+    assert too_fast([0.95 * PACE_LIMIT] * 200) == []
+    assert too_fast([1.05 * PACE_LIMIT] * 200)

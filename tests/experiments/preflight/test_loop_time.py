@@ -35,10 +35,6 @@ def test_a_command_may_set_another_time(tmp_path, capsys):
     assert measured(tmp_path, capsys, 0.6) == 0.6
 
 
-def test_the_default_time_is_unchanged():
-    assert LoopSection().test_time == 5.0
-
-
 @pytest.mark.parametrize("seconds", [0.0, 0.49, -1.0])
 def test_too_short_a_time_is_refused(seconds):
     with pytest.raises(ValueError, match="test_time"):

@@ -1,9 +1,8 @@
 """The limits of the arm follow from rig.toml and the arm's constants."""
 
 import numpy as np
-import pytest
 
-from experiments.rig.build import build_limits, build_safety_limits, build_walls
+from experiments.rig.build import build_limits, build_walls
 from experiments.settings.load import load_settings
 from wam.driver.settings import ArmSettings
 from wam.model.constants import load_constants
@@ -41,11 +40,3 @@ def test_the_host_allows_the_motors_the_torque_of_every_joint_limit():
         CONSTANTS.ipnm * np.linalg.solve(CONSTANTS.j2mp.T, np.diag(RIG.limits.torque)).T
     )
     assert (np.abs(units).max(axis=0) <= own).all()
-
-
-def test_the_module_warns_at_a_share_of_its_fault_limits():
-    omitted = {"speed_warning": None, "torque_warning_units": None}
-    safety = RIG.safety.model_copy(update=omitted)
-    limits = build_safety_limits(RIG.model_copy(update={"safety": safety}))
-    assert limits.speed_warning == pytest.approx(0.9 * RIG.safety.speed_fault)
-    assert limits.torque_warning_units == int(0.9 * RIG.safety.torque_fault_units)

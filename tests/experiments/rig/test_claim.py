@@ -75,7 +75,7 @@ def test_every_foreign_identifier_is_reported_once(bus):
 def test_a_quiet_bus_is_listened_to_without_sending(bus):
     start_ns = bus.t_ns
     check_alone(bus.link, bus, "traction-fake:bus")
-    assert bus.t_ns - start_ns == LISTEN_NS == 50_000_000
+    assert bus.t_ns - start_ns == LISTEN_NS
     assert frames_of(bus.link, bus) == []
 
 

@@ -1,5 +1,7 @@
 """Faults of bus, pucks and safety circuit through the whole program."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.verify import verify_file
 from experiments.operator.prompts import Prompt
 from tests.acquisition.ros import decode, messages_of
+from tests.experiments.messages import pattern
 from tests.experiments.program import (
     digest,
     journal,
@@ -76,6 +79,18 @@ ENDINGS = {
         E_STOP,
     ),
 }
+# messages of the catalogue that these faults raise
+MESSAGES = {
+    "can-silence": "can-silence",
+    "puck-silent": "puck-silent",
+    "bus-off": "bus-off",
+    "interface-down": "interface-down",
+    "unacknowledged": "unacknowledged",
+    "estop": "estop",
+    "safety-torque": "safety-idle",
+    "safety-voltage": "safety-stop",
+}
+BUS_FAULTS = set(MESSAGES.values())
 # Puck 3 sends no replies after these faults.
 SILENT = {"puck-silent", "puck-reboot", "can-silence", "bus-off"}
 SILENT |= {"interface-down", "unacknowledged"}
@@ -105,6 +120,8 @@ def test_a_bus_fault_is_reported_with_arm_state_and_safe_trials(ended):
     (line,) = seen.done.err.splitlines()
     assert line.startswith(begin)
     assert arm in line
+    if name in MESSAGES:
+        assert re.match(pattern(MESSAGES[name]), line)
     assert line.endswith(f"0 trials are safe in {seen.folder}.")
     assert seen.done.out.splitlines()[-2] == last
 

@@ -88,11 +88,6 @@ def test_a_trial_records_puck_temperatures_and_errors_at_its_start(first_trial):
     assert fields["pucks:error"] == "0 0 0 0 0 0 0"
 
 
-def test_a_usual_trial_has_no_safety_warning_or_fault(first_trial):
-    flags = TrialReader(first_trial).cycles().data["flags"]
-    assert not (flags & (Flag.SAFETY_WARNING | Flag.SAFETY_FAULT)).any()
-
-
 def test_the_preflight_page_shows_firmware_zero_and_temperatures(tmp_path):
     done = traction("check", "--fake", "--fast", "--data", tmp_path)
     assert "firmware 200, zeroed, 33-35 °C" in done.out

@@ -22,10 +22,6 @@ def requested(*pauses_ns):
     return stop
 
 
-def test_the_time_limit_of_urgent_requests_is_unchanged():
-    assert URGENT_NS == 3_000_000_000
-
-
 def test_the_first_request_is_not_urgent_whatever_the_time():
     class Early:
         def now_ns(self):

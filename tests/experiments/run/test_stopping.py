@@ -7,8 +7,7 @@ from acquisition.sample import SAFETY_MODE_MASK
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.verify import verify_file
 from experiments.operator.prompts import Prompt
-from experiments.run.stop import StopFlag
-from tests.experiments.program import journal, run_watched, sidecar
+from tests.experiments.program import run_watched, sidecar
 
 pytestmark = pytest.mark.slow
 
@@ -71,12 +70,6 @@ def disturbed(tmp_path_factory, config):
     return run_watched(config, tmp_path_factory.mktemp("disturbed"), 2, press=press)
 
 
-def test_ctrl_c_ends_the_session_unfinished(once):
-    assert once.done.code == 5
-    assert journal(once.folder)[-1]["reason"] == "unfinished"
-    assert "Nothing that was recorded is lost. 1 trial is safe in" in once.done.out
-
-
 def test_ctrl_c_closes_the_running_trial_as_interrupted(once):
     path = once.folder / "rejected" / "T02a.mcap"
     assert verify_file(path).sha256 == sidecar(path)["sha256"]
@@ -135,11 +128,6 @@ def test_ctrl_c_twice_idles_the_arm_without_waiting_for_a_hand(
     assert seen.rig.network.safety_mode is SafetyMode.IDLE
     waited = asked_for.count(Prompt.LAY_DOWN) * 0.02
     assert waited <= (apart + 0.1 if apart else 0.0)
-
-
-def test_signal_handlers_are_restored_after_a_session(once, twice):
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
 
 
 def test_a_fault_during_the_review_does_not_lose_the_trial(disturbed):
@@ -208,24 +196,3 @@ def test_a_fault_after_the_last_trial_names_the_report_and_nothing_to_resume(
     assert "▲ No tare at the end: Stop pressed" in seen.done.out
     assert "zero the arm, then: traction report." in seen.done.out
     assert "resume" not in seen.done.err + seen.done.out
-
-
-class ManualClock:
-    """Clock that the test advances."""
-
-    def __init__(self):
-        self.now = 5_000_000_000
-
-    def now_ns(self):
-        return self.now
-
-
-@pytest.mark.parametrize(("pause", "is_urgent"), [(3.0, True), (3.1, False)])
-def test_a_second_request_soon_after_the_first_is_urgent(pause, is_urgent):
-    clock = ManualClock()
-    stop = StopFlag(clock)
-    stop.request()
-    assert (stop.count, stop.is_urgent) == (1, False)
-    clock.now += round(pause * 1e9)
-    stop.request()
-    assert (stop.count, stop.is_urgent) == (2, is_urgent)

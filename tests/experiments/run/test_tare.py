@@ -19,6 +19,9 @@ from experiments.rig.build import build_tool
 from experiments.run.fault_plan import FaultTrigger
 from experiments.run.stop import StopRequestedError
 from experiments.run.tare import (
+    LIFTED,
+    MAX_TARES,
+    STILL_SPEED,
     known_bias,
     residual_force,
     take_end_tare,
@@ -219,12 +222,10 @@ def test_the_operator_is_asked_to_lift_during_the_whole_tare(tmp_path):
     assert asked == {(Prompt.LIFT, 3, 2)}
 
 
-@pytest.mark.parametrize(
-    ("height", "waits"), [(0.031, False), (0.03, True), (0.029, True)]
-)
-def test_a_foot_counts_as_lifted_above_the_minimum_height(tmp_path, height, waits):
+@pytest.mark.parametrize(("share", "waits"), [(1.03, False), (1.0, True), (0.97, True)])
+def test_a_foot_counts_as_lifted_above_the_minimum_height(tmp_path, share, waits):
     context = lifted(tmp_path)
-    context.loop_client.height = lambda s: 0.1 if s > 1.0 else height
+    context.loop_client.height = lambda s: 0.1 if s > 1.0 else share * LIFTED
     take_tare(context, TrialName(1, 1))
     assert (context.loop_client.advanced > 2.0) is waits
 
@@ -232,12 +233,12 @@ def test_a_foot_counts_as_lifted_above_the_minimum_height(tmp_path, height, wait
 @pytest.mark.parametrize(
     ("speed", "is_still"),
     [
-        ((0.009, 0, 0, 0, 0, 0), True),
-        ((-0.009, 0, 0, 0, 0, 0), True),
-        ((0, 0.011, 0, 0, 0, 0), False),
-        ((0, 0, -0.011, 0, 0, 0), False),
-        ((0.01, 0, 0, 0, 0, 0), False),
-        ((0, 0, -0.01, 0, 0, 0), False),
+        ((0.9 * STILL_SPEED, 0, 0, 0, 0, 0), True),
+        ((-0.9 * STILL_SPEED, 0, 0, 0, 0, 0), True),
+        ((0, 1.1 * STILL_SPEED, 0, 0, 0, 0), False),
+        ((0, 0, -1.1 * STILL_SPEED, 0, 0, 0), False),
+        ((STILL_SPEED, 0, 0, 0, 0, 0), False),
+        ((0, 0, -STILL_SPEED, 0, 0, 0), False),
         ((0, 0, 0, 1.0, 0, 0), True),
     ],
 )
@@ -274,8 +275,8 @@ def test_too_many_refused_tares_end_the_session(tmp_path, capsys):
     context.loop_client.force = lambda s: 3.0 * (s % 0.5)
     with pytest.raises(PreflightError, match="Force varied"):
         take_tare(context, TrialName(1, 1))
-    assert context.loop_client.requested.count(ArmState.GUIDE) == 5
-    assert capsys.readouterr().err.count("Force varied") == 4
+    assert context.loop_client.requested.count(ArmState.GUIDE) == MAX_TARES
+    assert capsys.readouterr().err.count("Force varied") == MAX_TARES - 1
     assert events(context, Event.TARED) == []
 
 
@@ -375,16 +376,6 @@ def test_other_settings_files_are_not_read_as_a_calibration():
     assert known_bias({"rig": text}, "tread", is_simulated=False) is None
     container = {"calibration:terrain.toml": "name = 1"}
     assert known_bias(container, "tread", is_simulated=False) is None
-
-
-def test_planned_faults_of_a_tare_are_due_from_its_start(tmp_path):
-    context = lifted(tmp_path)
-    due = []
-    context.console_loop.faults = SimpleNamespace(
-        inject_due=lambda *given: due.append(given)
-    )
-    take_tare(context, TrialName(4, 1))
-    assert due[0] == (FaultTrigger.TARE, 4, 0.0)
 
 
 def test_the_journal_has_the_bias_that_the_loop_uses(tmp_path):

@@ -104,29 +104,6 @@ def test_quit_while_judging_again_leaves_the_first_verdict(tmp_path):
     assert (context.metadata.folder.trials / "T01.mcap").exists()
 
 
-def test_undoing_the_verdict_of_a_redo_reopens_the_redo(
-    tmp_path,
-):
-    context = make_context(tmp_path, Keys("k"))
-    details = {"trial": 1, "attempt": 1}
-    context.journal.append(Event.TRIAL_STARTED, **details)
-    context.journal.append(Event.TRIAL_RECORDED, **details)
-    context.journal.append(Event.TRIAL_KEPT, **details)
-    context.journal.append(Event.ENDED, reason="unfinished")
-    context.journal.append(Event.REDO, trial=1, reason="worn")
-    context.journal.append(Event.ACTIVATED)
-    context.journal.append(Event.SET_ASIDE, trial=1, attempt=1)
-    second = {"trial": 1, "attempt": 2}
-    context.journal.append(Event.TRIAL_STARTED, **second)
-    context.journal.append(Event.TRIAL_RECORDED, **second)
-    context.journal.append(Event.TRIAL_KEPT, **second)
-    assert context.journal.state.is_over
-    context.journal.append(Event.VERDICT, **second, verdict="reject", reason="r")
-    assert (context.journal.state.is_over, context.journal.state.redoing) == (False, 1)
-    context.journal.append(Event.VERDICT, **second, verdict="keep", reason="r")
-    assert context.journal.state.is_over
-
-
 def test_a_verdict_cannot_be_undone_after_the_time_limit(tmp_path, capsys):
     context = judged(tmp_path, "k", *[""] * round(UNDO_NS * 1e-9 / TICK), "u")
     while context.operator.keys:

@@ -4,7 +4,6 @@ import json
 import shutil
 import tomllib
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 
 import pytest
@@ -137,25 +136,6 @@ def test_an_empty_or_overlong_note_is_refused(copied, text):
 
 
 # --- init -----------------------------------------------------------------------------
-
-
-def test_init_writes_both_files_with_their_comments(tmp_path):
-    done = traction("init", tmp_path / "lab")
-    assert done.code == 0
-    for name in ("rig.toml", "matrix.toml"):
-        shipped = (resources.files("experiments.data") / name).read_text()
-        assert (tmp_path / "lab" / name).read_text() == shipped
-        assert "#" in shipped
-    check = traction("check", "--config-only", "--config", tmp_path / "lab/rig.toml")
-    assert check.code == 0
-
-
-def test_init_overwrites_nothing(tmp_path):
-    (tmp_path / "matrix.toml").write_text("mine")
-    done = traction("init", tmp_path)
-    assert done.code == 2
-    assert done.err.startswith(f"{tmp_path / 'matrix.toml'} exists already.")
-    assert [path.name for path in tmp_path.iterdir()] == ["matrix.toml"]
 
 
 def line_in(path, setting, key):

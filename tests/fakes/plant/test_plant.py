@@ -304,19 +304,6 @@ def test_the_truth_has_one_row_per_cycle_from_its_request():
     assert truth.table()[0, 7:10] == pytest.approx(sole(plant), abs=1e-12)
 
 
-def test_dry_friction_holds_smaller_torques():
-    plant = make_plant(friction=1.0)
-    release(plant)
-    plant.hand.let_go()
-    before = plant.q.copy()
-    for _ in range(250):
-        send(plant, MODEL.gravity(plant.q) + 0.5 * CONSTANTS.coulomb)
-        plant.advance(plant.t_ns + CYCLE_NS)
-    crept = np.abs(plant.q - before)
-    # half of dry friction is reached at 0.0055 rad/s: 2.7 mrad in half a second
-    assert crept.max() < 0.003
-
-
 def test_smaller_steps_give_the_same_motion():
     ends = []
     for substeps in (4, 16):

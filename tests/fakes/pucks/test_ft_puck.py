@@ -179,15 +179,6 @@ def test_a_sleeping_sensor_has_only_monitor_properties():
         assert host.say(other) == []
 
 
-def test_a_woken_sensor_is_silent_while_it_boots():
-    host = Host(are_asleep=True)
-    assert host.say("85 00 02 00 00 00") == []
-    assert host.say("05") == []
-    host.hear(600 * MS)
-    assert host.say("05") == ["506 85 00 02 00"]
-    assert len(host.say("36")) == 2
-
-
 def test_a_reset_sensor_is_in_its_monitor_without_its_tare():
     host = Host(LOAD)
     host.say("b6 00 00 00 00 00")

@@ -140,15 +140,6 @@ def test_sleeping_pucks_answer_only_monitor_properties():
     assert host.say(0x404, "30") == []
 
 
-def test_a_woken_puck_is_silent_while_it_boots():
-    host = Host(ASLEEP)
-    assert host.say(1, "85 00 02 00 00 00") == []
-    assert host.say(1, "05") == []
-    host.hear(600 * MS)
-    assert host.say(1, "05") == ["426 85 00 02 00"]
-    assert host.say(1, "00") == ["426 80 00 c8 00"]
-
-
 def test_power_up_loses_positions():
     host = Host(NetworkOptions(is_zeroed=False))
     assert host.say(2, "30") != ["443 3f 70 1f"]

@@ -162,26 +162,6 @@ def test_a_reversed_encoder_counts_backwards(build):
     assert reported == pytest.approx(signs * true, abs=2.0)
 
 
-def test_swapped_encoders_report_each_others_motor(build):
-    plant = build("encoders-6-7-swapped").plant
-    plant.q = CONSTANTS.home
-    home = np.array(plant.counts())
-    plant.q = NEAR_HOME
-    reported = (np.array(plant.counts()) - home).tolist()
-    true = (CONSTANTS.j2mp @ (NEAR_HOME - CONSTANTS.home) / TURNS).tolist()
-    true[5], true[6] = true[6], true[5]
-    assert reported == pytest.approx(true, abs=2.0)
-
-
-def test_a_rotor_on_a_torn_cable_reports_no_motion(build):
-    rig = build("cable-4-torn")
-    before = rig.plant.counts()
-    rig.plant.q = NEAR_HOME
-    after = rig.plant.counts()
-    stands = [a == b for a, b in zip(after, before, strict=True)]
-    assert [n for n, still in enumerate(stands, 1) if still] == [4]
-
-
 def test_a_wrong_zero_offsets_positions(build):
     plant = build("zero-2-off-10deg").plant
     plant.q = NEAR_HOME
@@ -322,16 +302,6 @@ def test_a_dead_button_has_no_effect(build):
         arm.network.pendant("estop")
     assert rig.network.safety_mode is SafetyMode.ACTIVE
     assert sound.network.safety_mode is not SafetyMode.ACTIVE
-
-
-def test_a_disobedient_module_stays_active(build):
-    modes = []
-    for name in ("module-disobeys", ""):
-        rig = build(name)
-        rig.network.pendant("activate")
-        exchange(rig, SAFETY_NODE, encode_set(8, int(SafetyMode.IDLE)))
-        modes.append(rig.network.safety_mode)
-    assert modes == [SafetyMode.ACTIVE, SafetyMode.IDLE]
 
 
 def test_a_slow_module_has_a_longer_heartbeat_timeout(build):

@@ -313,10 +313,6 @@ def test_identifiers_have_eleven_bits(can_id):
             frames.split_id(beyond)
 
 
-def test_the_safety_module_is_node_10():
-    assert frames.SAFETY_NODE == 10
-
-
 @pytest.mark.parametrize("to", [*range(1, 9), 10])
 def test_a_frame_to_a_device_is_from_a_host_whatever_its_sender_field(to):
     for sender in range(32):

@@ -258,14 +258,6 @@ def test_shaking_by_hand_does_not_disable_compensation():
     assert compensation.oscillating_motor == 0
 
 
-def test_unchanged_counts_cause_no_torque_step():
-    compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
-    angles = turning(1, 0.3)
-    before = after(compensation, angles)[-1]
-    silent = after(compensation, np.tile(angles[-1], (5, 1)), 200)[-1]
-    assert np.allclose(silent, before)
-
-
 REACH = np.array([4.0, 4.0, 4.0, 4.0, 8.0, 8.0, 8.0]) * 1e-3  # rad of the joint
 
 

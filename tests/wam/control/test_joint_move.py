@@ -66,12 +66,6 @@ def test_the_pd_part_is_clipped_joint_by_joint():
     )
 
 
-def test_an_obstacle_is_pressed_with_a_bounded_force():
-    """Torque beyond the weight [N m] on a person who holds a joint."""
-    held = joint_pd(np.full(7, 1e6), np.zeros(7), np.ones(7), np.zeros(7))
-    assert held.tolist() == [25.0, 20.0, 15.0, 15.0, 5.0, 5.0, 5.0]
-
-
 @pytest.mark.parametrize("length", [0.1, 0.49, 0.51, 2.0])
 @given(share=st.floats(0.0, 1.0))
 def test_a_move_decelerates_as_it_accelerates(length, share):

@@ -1,5 +1,3 @@
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
@@ -58,22 +56,6 @@ def test_an_awake_arm_starts_without_waking_its_pucks():
     assert not any(p.was_asleep for p in info.pucks)
     assert (1, bytes.fromhex("85 00 02 00 00 00")) not in frames(rig)
     assert arm.safety_mode() is SafetyMode.IDLE
-
-
-def test_sleeping_pucks_are_woken_in_turn_and_left_alone_while_they_boot():
-    rig = Rig(NetworkOptions(are_asleep=True))
-    info = WamArm(rig.link, rig.clock).start()
-    wakes = [
-        (t, i)
-        for t, i, data in rig.sent
-        if data == b"\x85\0\2\0\0\0" and i in range(1, 8)
-    ]
-    assert [node for _, node in wakes] == [1, 2, 3, 4, 5, 6, 7]
-    assert {b - a for (a, _), (b, _) in pairwise(wakes)} == {10_000_000}
-    after = min(t for t, _, _ in rig.sent if t > wakes[-1][0])
-    assert after - wakes[-1][0] >= 1_000_000_000
-    assert [p.vers for p in info.pucks] == [200] * 7
-    assert not info.is_zeroed
 
 
 @pytest.mark.parametrize("vers", [33, 61, 200])
@@ -137,30 +119,6 @@ def test_an_arm_of_another_kind_is_refused(options, words):
     rig = Rig(options)
     with pytest.raises(PreflightError, match=words):
         WamArm(rig.link, rig.clock).start()
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        NetworkOptions(ipnm=(2700, 0, 2700, 2700, 6500, 6500, 17474)),
-        NetworkOptions(cts=(4096, -1, 4096, 4096, 4096, 4096, 4096)),
-    ],
-)
-def test_a_puck_without_constants_is_refused(options):
-    rig = Rig(options)
-    with pytest.raises(DeviceFaultError, match="Puck 2 reports"):
-        WamArm(rig.link, rig.clock).start()
-
-
-@pytest.mark.parametrize(("is_active", "expected"), [(False, 1), (True, 0)])
-def test_pucks_are_idled_at_start_unless_the_arm_is_active(is_active, expected):
-    # A heartbeat longer than the start-up, which reads no position.
-    rig = Rig(NetworkOptions(heartbeat_ns=10_000_000_000))
-    if is_active:
-        rig.network.pendant("activate")
-    WamArm(rig.link, rig.clock).start()
-    idle = (0x404, bytes.fromhex("88 00 00 00 00 00"))
-    assert frames(rig).count(idle) == expected
 
 
 def test_reading_before_start_is_refused():

@@ -7,7 +7,7 @@ from acquisition.devices import SafetyMode
 from acquisition.errors import DeviceFaultError
 from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
-from wam.bus.frames import MOTOR_NODES, decode_torques
+from wam.bus.frames import MOTOR_NODES
 from wam.bus.property_client import PropertyClient
 from wam.driver.arm import WamArm
 
@@ -89,18 +89,6 @@ def test_the_safety_module_is_watched(bench):
     for _ in range(30):
         bench.cycle(np.zeros(7))
     assert bench.arm.safety_warnings() == ("voltage",)
-
-
-def test_idle_is_confirmed_before_zero_torque(bench):
-    bench.rig.network.pendant("activate")
-    bench.cycle(TAU)
-    bench.rig.sent.clear()
-    assert bench.arm.idle()
-    # After the requests to the module and to the pucks.
-    nodes = (0x00A, *MOTOR_NODES)
-    order = [(i, d) for _, i, d in bench.rig.sent if i not in nodes]
-    assert [decode_torques(data) for _, data in order] == [(0, 0, 0, 0)] * 2
-    assert bench.rig.network.safety_mode is SafetyMode.IDLE
 
 
 def test_positions_are_defined(generation):
@@ -243,8 +231,3 @@ def test_pucks_that_cannot_share_a_torque_frame_are_refused(other):
         WamArm(rig.link, rig.clock).start()
     assert f"200 200 {other} 200 200 200 200" in caught.value.message
     assert "P or T" in caught.value.message
-
-
-def test_pucks_of_several_old_generations_work_together():
-    rig = Rig(NetworkOptions(vers=(50, 51, 60, 60, 60, 60, 50)), HOME_COUNTS)
-    assert len(WamArm(rig.link, rig.clock).start().pucks) == 7

@@ -176,12 +176,6 @@ def test_a_heavier_foot_needs_more_holding_torque(bare, foot_model):
     assert lifted[1] == pytest.approx(arm * GRAVITY, abs=1e-9)  # lever times weight
 
 
-def test_the_shipped_sensor_is_light_and_flat():
-    body = sensor_body()
-    assert body.mass == 0.136
-    assert body.com.tolist() == [0.0, 0.0, 0.006]
-
-
 @pytest.mark.shared_data
 @pytest.mark.parametrize("name", STROKES)
 def test_a_recorded_arm_agrees_with_the_model(shared_data, name):

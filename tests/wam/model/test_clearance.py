@@ -5,7 +5,6 @@ import pytest
 
 from wam.model.arm_model import ArmModel
 from wam.model.clearance import (
-    BASE_HEIGHT,
     CLEARANCE_MARGIN,
     STEP,
     ArmClearance,
@@ -49,10 +48,6 @@ def test_floor_clearance_of_the_foot_agrees_with_the_kinematics(example_tool):
     height = ArmClearance(CONSTANTS, example_tool, (), sole - 0.2).nearest(down)
     assert {height.first, height.second} == {"the foot", "the floor"}
     assert height.distance == pytest.approx(0.2, abs=0.01)
-
-
-def test_the_floor_is_below_the_base_frame_by_its_height():
-    assert pytest.approx(0.346) == BASE_HEIGHT
 
 
 def test_an_obstacle_is_at_its_stated_location(example_tool):
@@ -199,10 +194,6 @@ def test_a_path_is_checked_end_to_end_in_equal_steps():
     assert len(path) in (6, 7)
     assert len(straight_path(start, start)) == 2
     assert len(straight_path(start, start + 0.999 * STEP)) == 2
-
-
-def test_the_margin_has_its_documented_value():
-    assert pytest.approx(0.03) == CLEARANCE_MARGIN
 
 
 class GivenGaps(ArmClearance):

@@ -7,15 +7,6 @@ from wam.model.constants import load_constants
 SHIPPED = load_constants()
 
 
-def test_the_shipped_arm_is_read():
-    assert SHIPPED.d.tolist() == [0.0, 0.0, 0.55, 0.0, 0.3, 0.0, 0.0609]
-    assert SHIPPED.a.tolist() == [0.0, 0.0, 0.045, -0.045, 0.0, 0.0, 0.0]
-    alpha = np.array([-0.5, 0.5, -0.5, 0.5, -0.5, 0.5, 0.0]) * np.pi
-    assert np.allclose(SHIPPED.alpha, alpha, rtol=1e-15)
-    assert SHIPPED.home.tolist() == [0.0, -2.0, 0.0, 3.13, 0.0, 0.0, 0.0]
-    assert len(SHIPPED.links) == 7
-
-
 def test_home_is_at_two_joint_stops():
     outside = (SHIPPED.home >= SHIPPED.q_upper) | (SHIPPED.home <= SHIPPED.q_lower)
     assert np.flatnonzero(outside).tolist() == [1, 3]
