@@ -43,7 +43,9 @@ _LIFT_SECONDS = (
 _GRAVITY_SECONDS, _GRAVITY_KEPT = 1.4, 0.6
 _ON_POSE = 0.12  # rad, tolerance of the rest pose
 _PATIENCE = 120.0  # s, time-out of the activation
-_MIDDLE = (0.3, 0.8)  # section of a lift's travel in which torque is averaged
+# Section of a lift in which torque is averaged, as shares of the travel reached: the
+# rest at the top, where friction reverses, is left out however far the joint came.
+_MIDDLE = (0.3, 0.8)
 # Tolerance of the measured weights: N m by joint, for masses of the drawings, and a
 # relative one.
 _WEIGHT_TOLERANCE: Mapping[int, float] = {2: 2.0, -4: 0.7, -6: 0.25}
@@ -311,7 +313,9 @@ def judge_lift(values: Values) -> Judgement:
         q, tau = values["q"][part][:, i], sense * values["tau"][part][:, i]
         travel = sense * (q - q[0])
         rows.append(judge_quantity("lifted", 1e3 * travel.max(), joint=i + 1))
-        low, high = (share * POWERED_TEST_LIMITS.lift_travel for share in _MIDDLE)
+        if not rows[-1].measured.is_within:
+            continue
+        low, high = (share * travel.max() for share in _MIDDLE)
         inside = (travel > low) & (travel < high)
         before = np.arange(len(travel)) < int(travel.argmax())
         up, down = tau[inside & before], tau[inside & ~before]

@@ -181,15 +181,23 @@ def test_only_a_heartbeat_fault_counts_as_the_heartbeat(fault, causes, is_heartb
     assert rest_pose.is_heartbeat(verdict) is is_heartbeat
 
 
-def lifted(share):
-    """Recording of joint 2 with `share` of its predicted weight."""
-    lift = np.concatenate([np.linspace(0.0, 0.08, 400), np.linspace(0.08, 0.0, 400)])
-    q, tau, predicted = np.tile(CONSTANTS.home, (800, 1)), *np.zeros((2, 800, 7))
+def lifted(share, reach=0.08, friction=1.0, top=0):
+    """Recording of joint 2 with `share` of its predicted weight.
+
+    Args:
+        share: weight over the predicted one.
+        reach: travel [rad].
+        friction: [N m].
+        top: cycles that the joint rests at its top; friction still acts downwards.
+    """
+    up, n = np.linspace(0.0, reach, 400), 800 + top
+    lift = np.concatenate([up, np.full(top, reach), up[::-1]])
+    q, tau, predicted = np.tile(CONSTANTS.home, (n, 1)), *np.zeros((2, n, 7))
     q[:, 1] += lift
     predicted[:, 1] = 18.7
-    tau[:, 1] = 18.7 * share + np.where(np.arange(800) < 400, 1.0, -1.0)  # friction
+    tau[:, 1] = 18.7 * share + friction * np.where(np.arange(n) < 400 + top, 1, -1)
     return {
-        "proof": np.zeros(800),
+        "proof": np.zeros(n),
         "joints": np.array([2]),
         "torques": np.array([25.0]),
         "q": q,
@@ -207,6 +215,11 @@ def test_the_weight_on_a_joint_must_agree_with_the_prediction(share, is_sound):
     cause = rest_pose.judge_lift(lifted(share)).cause
     assert (cause == "") is is_sound
     assert is_sound or cause.startswith("weight on joint 2")
+
+
+@pytest.mark.parametrize("reach", [0.061, 0.08, 0.1])
+def test_the_rest_at_the_top_of_a_lift_is_left_out_of_the_weight(reach):
+    assert rest_pose.judge_lift(lifted(1.0, reach, friction=4.0, top=2000)).cause == ""
 
 
 def test_a_recording_is_read_as_written_or_refused(tmp_path):
