@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.experiments.program import write_config
+
 ROOT = Path(__file__).parents[1]
 SLICE = Path(__file__).parent / "data" / "rehearsal_slice.npz"
 NOTEBOOK = f"""
@@ -59,7 +61,8 @@ def test_processes_are_refused_with_the_cause(tmp_path):
 def test_a_session_is_simulated_verified_and_reported(tmp_path):
     data = ("--data", tmp_path)
     asked = ("run", "TF", "--fake", "--fast", "--trials", 1)
-    elsewhere(*asked, "--operator-script", "auto", *data)
+    short = ("--config", write_config(tmp_path))
+    elsewhere(*asked, "--operator-script", "auto", *short, *data)
     assert "every kept trial is unchanged" in elsewhere("verify", "--all", *data)
     assert "S001" in elsewhere("status", *data)
     elsewhere("export", "S001", "--to", tmp_path / "tables", *data)

@@ -12,7 +12,7 @@ from packaging.utils import canonicalize_name
 
 from acquisition.errors import MissingLibraryError
 from acquisition.extras import EXTRAS, require_extra
-from tests.experiments.program import traction
+from tests.experiments.program import traction, write_config
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -120,7 +120,7 @@ def test_without_any_extra_trials_are_recorded_verified_and_exported(tmp_path):
     hidden = foreign_modules()
     assert {name for extra in EXTRAS.values() for name in extra} <= set(hidden)
     for arguments in (
-        ("run", "TF", *FAKE, "--trials", 2),
+        ("run", "TF", *FAKE, "--trials", 2, "--config", write_config(tmp_path)),
         ("verify", "--all"),
         ("status",),
         ("check", "--fake"),

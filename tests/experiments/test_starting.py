@@ -42,7 +42,7 @@ def test_a_session_without_streams_is_recorded(tmp_path):
     done = started(
         tmp_path,
         *("run", "S0", "--fake", "--fast", "--trials", 1, "--data", data),
-        *("--operator-script", "auto"),
+        *("--operator-script", "auto", "--config", write_config(tmp_path)),
         closed=CLOSED,
     )
     assert done.returncode == 0, done.stderr
@@ -83,7 +83,7 @@ def test_a_session_without_output_ends_unfinished(tmp_path):
     done = started(
         tmp_path,
         *("run", "S0", "--fake", "--fast", "--trials", 1, "--data", data),
-        *("--operator-script", "auto"),
+        *("--operator-script", "auto", "--config", write_config(tmp_path)),
         full=True,
     )
     assert done.returncode == 5, done.stderr
