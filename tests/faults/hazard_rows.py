@@ -578,7 +578,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "the torque that moves a joint for certain, then idle",
             (
                 "tests/fakes/world/test_stopped_moves.py::test_holding_the_arm_in_a_move_brakes_it",
-                _CONTACT + "test_a_load_is_not_judged_before_the_first_tare",
+                "tests/acquisition/control_loop/test_cycle.py::test_a_load_is_judged_only_after_a_tare",
             ),
         ),
         "stuck": (
