@@ -28,6 +28,7 @@ def recorded(tmp_path):
     return tmp_path, tmp_path / "rig.toml"
 
 
+@pytest.mark.slow
 def test_one_seed_always_records_the_same_cycles(tmp_path):
     kept = json.loads(KEPT.read_text())
     result = digests_in_process(tmp_path)

@@ -34,14 +34,19 @@ def drawn(**environment):
     return done.stdout
 
 
+@pytest.fixture(scope="module")
+def plain():
+    return drawn(MPLBACKEND="agg")
+
+
 @pytest.mark.parametrize(
     "backend", ["nonsense", "module://matplotlib_inline.backend_inline"]
 )
-def test_a_backend_that_is_not_installed_is_not_used(backend):
-    assert drawn(MPLBACKEND=backend) == drawn(MPLBACKEND="agg")
+def test_a_backend_that_is_not_installed_is_not_used(backend, plain):
+    assert drawn(MPLBACKEND=backend) == plain
 
 
-def test_a_style_of_the_user_is_not_used(tmp_path):
+def test_a_style_of_the_user_is_not_used(tmp_path, plain):
     style = "text.usetex: True\nlines.linewidth: 9\nfigure.facecolor: red\n"
     (tmp_path / "matplotlibrc").write_text(style)
-    assert drawn(MPLCONFIGDIR=str(tmp_path)) == drawn()
+    assert drawn(MPLCONFIGDIR=str(tmp_path)) == plain

@@ -18,7 +18,6 @@ from analysis.terrains.known import KnownTerrain, TerrainDatabase
 from analysis.terrains.logistic import RidgeLogistic
 from analysis.terrains.path_copula import PathCopula
 from analysis.terrains.table import Table, rows_of
-from analysis.terrains.tabulation import database_of
 from analysis.terrains.windows import FEATURES
 from tests.analysis.terrains.export.databases import from_rest
 from tests.analysis.terrains.tables import normal_table
@@ -255,13 +254,3 @@ def test_the_schema_refuses_what_the_reader_refuses(tmp_path, changes, location)
     if "simulated" not in changes:  # the reader accepts any truth value
         with pytest.raises(SettingsError):
             load(saved(tmp_path, content))
-
-
-def test_a_terrain_database_answers_from_rest_and_in_motion(small_study, tmp_path):
-    fit = replace(small_study.options.fit, models=("tustin",))
-    study = replace(small_study, options=replace(small_study.options, fit=fit))
-    path = tmp_path / "terrains.json"
-    path.write_text(database_of(study, None, "2027-01-15T08:00:00Z", 1))
-    known = load(path).terrain("S0")
-    assert known.slip_risk(6.0, 3.5).kind == "break-away"
-    assert known.risk_in_motion(6.0, 3.5).kind == "in motion"

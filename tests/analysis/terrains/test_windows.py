@@ -303,7 +303,7 @@ def made_up(name, number, rng):
 
 
 @pytest.mark.parametrize("surface", [ROCKY_GROUND, FLAT_GROUND])
-@pytest.mark.parametrize("trials", [10, 40])
+@pytest.mark.parametrize("trials", [10, pytest.param(40, marks=pytest.mark.slow)])
 def test_the_rejection_rate_of_held_out_windows_is_the_allowed_one(surface, trials):
     shares = []
     for seed in range(8):
