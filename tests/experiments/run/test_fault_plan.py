@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from acquisition.devices import SafetyMode
-from acquisition.sample import SAFETY_MODE_MASK
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.verify import verify_file
 from tests.acquisition.ros import decode, messages_of
@@ -29,12 +28,6 @@ def stale(tmp_path_factory, config):
 def silence(tmp_path_factory, config):
     data = tmp_path_factory.mktemp("silence")
     return run_watched(config, data, 2, "--fault", "can-silence@T2+0.5s")
-
-
-@pytest.fixture(scope="module")
-def estop(tmp_path_factory, config):
-    data = tmp_path_factory.mktemp("estop")
-    return run_watched(config, data, 1, "--fault", "estop@T1+0.4s")
 
 
 @pytest.mark.parametrize(
@@ -143,23 +136,3 @@ def test_the_same_seed_gives_the_same_cycles_byte_for_byte(silence, recorded):
         for folder in (silence.folder, recorded.folder)
     )
     assert one.tobytes() == two.tobytes()
-
-
-def test_an_e_stop_ends_the_session_and_its_time_is_reported(estop):
-    assert estop.done.code == 4
-    (line,) = estop.done.err.splitlines()
-    assert line.startswith("Stop pressed at 0.4")
-    assert "Release it, press Shift-idle, zero the arm" in line
-    assert journal(estop.folder)[-1]["reason"] == "estop"
-
-
-def test_no_torque_is_commanded_after_an_e_stop(estop):
-    assert estop.rig.network.safety_mode is SafetyMode.E_STOP
-    last = TrialReader(estop.folder / "faults" / "T01a.flight.mcap").cycles().data[-1]
-    assert last["flags"] & SAFETY_MODE_MASK == SafetyMode.E_STOP
-    assert not last["torque_command"].any()
-
-
-def test_an_e_stop_saves_the_trial_as_interrupted_and_rejected(estop):
-    assert sidecar(estop.folder / "rejected" / "T01a.mcap")["status"] == "interrupted"
-    assert list((estop.folder / "trials").iterdir()) == []
