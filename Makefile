@@ -49,15 +49,10 @@ demo: $(USED)  ## two simulated sessions of ten trials, then the report of both
 	$(BIN)/traction status --data demo
 	$(BIN)/traction report --all --data demo
 
-wheel: $(STAMP)  ## built, installed in an environment of its own, a session run there
+wheel: $(STAMP)  ## built below build/wheel; .ci/installs installs it and runs it
 	rm -rf $(WHEEL) build/lib build/bdist.*
 	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps \
 	    --wheel-dir $(WHEEL) .
-	$(PYTHON) -m venv $(WHEEL)/venv
-	$(WHEEL)/venv/bin/python -m pip install --quiet --disable-pip-version-check \
-	    --constraint constraints.txt $(WHEEL)/*.whl
-	cd $(WHEEL) && venv/bin/traction --version
-	cd $(WHEEL) && venv/bin/traction run TF --fake --fast --trials 1 > session.log
 
 lab: $(STAMP)  ## the program beside the real kernel's drivers, in an emulated machine
 	$(BIN)/python -m lab
