@@ -255,7 +255,7 @@ def add_time_options(parser: ArgumentParser) -> None:
     chosen.add_argument(
         "--processes",
         action="store_true",
-        help="use the processes of the real rig, on the wall clock (simulation only); "
+        help="use the processes of the real rig, in real time (simulation only); "
         "needs an idle computer",
     )
 

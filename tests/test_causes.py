@@ -34,7 +34,7 @@ CAUSES = {
         "a puck in reset, and ZERO read back as 1 after 0 was written",
         "wam/driver/test_lost_writes.py::test_no_start_reports_a_lost_zero_as_zeroed",
     ),
-    ("wam/driver/arm.py", "replies came after the next question"): (
+    ("wam/driver/arm.py", "replies came after the next request"): (
         "the count of replies in cycles without a request",
         "wam/driver/test_late_replies.py::"
         "test_a_start_reports_late_positions_as_late_and_not_missing",
@@ -49,7 +49,7 @@ CAUSES = {
         "wam/driver/test_generations.py::"
         "test_pucks_that_cannot_share_a_torque_frame_are_refused",
     ),
-    ("wam/driver/arm.py", "answers more often than it is asked"): (
+    ("wam/driver/arm.py", "sends more replies than there are requests"): (
         "replies counted against requests",
         "wam/driver/test_lost_replies.py::"
         "test_an_arm_with_a_duplicated_puck_is_not_started",

@@ -46,7 +46,7 @@ class ProcessLostError(TractionError):
     def __init__(self, name: str, how: str, *, arm_state: str = "") -> None:
         super().__init__(
             f"The {name} process ended: {how}.",
-            hint="A .partial file: traction recover. Then start again.",
+            hint="If a .partial file is left: traction recover. Then start again.",
             arm_state=arm_state,
         )
         self.name = name

@@ -267,7 +267,7 @@ class TrialWriter:
             raise TrialFileError(
                 self.partial,
                 _reason(error),
-                hint=f"Kept as .partial: traction recover {self.partial}",
+                hint=f"Saved as .partial: traction recover {self.partial}",
             ) from error
 
 

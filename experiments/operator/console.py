@@ -33,7 +33,7 @@ class OutputError(TractionError):
     def __init__(self, error: OSError) -> None:
         super().__init__(
             f"The output cannot be written ({error.strerror}).",
-            hint="Make room, or send it elsewhere. What was recorded is safe.",
+            hint="Make room, or send it elsewhere. Recorded data are safe.",
         )
 
 

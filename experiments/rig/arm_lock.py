@@ -135,7 +135,7 @@ def _open_safely(path: Path) -> int:
     fields = os.fstat(descriptor)
     if not stat.S_ISREG(fields.st_mode) or fields.st_nlink != 1:
         os.close(descriptor)
-        raise _unusable(path, "it is not a plain file")
+        raise _unusable(path, "it is not a regular file")
     return descriptor
 
 

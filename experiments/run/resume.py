@@ -68,8 +68,8 @@ def choose_resume(
     if not isinstance(operator, TerminalInput):
         raise SessionError(
             " ".join([text, *(other.text() for other in sessions[:-1])]),
-            hint=f"To go on: traction resume {newest.folder.id}{data}   To close what "
-            "is unfinished: the same command with --new. Nothing was started.",
+            hint=f"To go on: traction resume {newest.folder.id}{data}   To close it: "
+            "the same command with --new. Nothing was started.",
         )
     name = "crash" if newest.is_crashed else "unfinished"
     name = "mismatch" if newest.folder.terrain != terrain else name

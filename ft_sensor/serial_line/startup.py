@@ -158,5 +158,6 @@ def silent_error() -> LinkTimeoutError:
     """Return the error for an open port without data."""
     # 100 ms is the limit in the running loop; the start-up waits longer.
     return LinkTimeoutError(
-        "No F/T data for 100 ms (port open, 0 bytes).", hint="Check power and cable."
+        "No F/T data for 100 ms (port open, 0 bytes).",
+        hint="Check the sensor's power and cable.",
     )

@@ -101,7 +101,7 @@ SILENCE = verdict_for(Fault.CAN_SILENCE, ReplySilence(10.0, 0x7F))
 def test_a_busy_computer_is_reported_first_and_no_cable_is_blamed():
     text = fault_text(SILENCE, FaultContext("T03", 1.5, load=LOAD))
     assert text.startswith(
-        "This computer is too busy to simulate on the wall clock (load 8.7, cores 2)."
+        "This computer is too busy to simulate in real time (load 8.7, cores 2)."
     )
     assert "No reply from the arm for 10 ms." in text
     assert "ARM: UNKNOWN - support it" in text

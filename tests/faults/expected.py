@@ -205,7 +205,7 @@ def _lying(motor: int) -> Row:
         return _row(OK)
     stopped = Cell(
         End.ENDED,
-        "The arm does not stay where it holds: ",
+        "The arm does not stay in place while it holds: ",
         arm=_IDLE,
         why="the jump seems a motion, and the arm idles",
     )
@@ -226,11 +226,11 @@ _NO_DATA = _refused("No F/T data for 100 ms")
 _NO_FRAME = _refused("No whole F/T frame")
 _FEW = "are too few for a tare"
 _FLAGGED = "F/T samples were flagged during tare"
-_ASKED = "Joint 7 was asked for "
+_ASKED = "Joint 7 would need "
 _STAYS = replace(OK, why="the arm is idle, and stays so")
 _PUSHED_AWAY = Cell(
     End.ENDED,
-    "The arm does not stay where it holds",
+    "The arm does not stay in place while it holds",
     arm=Arm(10, "idle", ArmState.IDLE, "idle"),
     why="it holds already, and is pushed away",
 )
@@ -245,12 +245,12 @@ _SLIP_LATER = replace(
     _SLIP,
     arm=None,
     why="watched in trials: stops the next one; let go, the foot swings back",
-    then=" rad/s > 4.00",
+    then=" rad/s (limit 4.00)",
 )
 # After a fault that ends a trial, the console requests hold 20 ms later.
 _BEYOND = Cell(
     End.REDONE,
-    "the F/T sensor was beyond its range for ",
+    "the F/T sensor was out of range for ",
     ("interrupted: ft-saturated",),
     Arm(120, "driven", HOLD, "holding"),
 )
@@ -260,9 +260,9 @@ _LOADED = Cell(
     ("interrupted: contact-force",),
     Arm(30, "driven", HOLD, "holding"),
 )
-_PAST = " answered an earlier question: positions are "
+_PAST = " answered an earlier request: positions are "
 # One cycle in 47 requests nothing; late positions are then proved within 20 ms.
-_OLD = Arm(120, "idle", ArmState.IDLE, "UNKNOWN, held with positions of the past")
+_OLD = Arm(120, "idle", ArmState.IDLE, "UNKNOWN, held with old positions")
 _UNPROVED = replace(OK, why="the session ends before a cycle asks for nothing")
 
 
@@ -307,14 +307,14 @@ _NEVER_SEEN_ACTIVE = Cell(
     why="the module says idle for ever, and the arm is held",
 )
 _SHARED = "Another program sends to the arm: frame "
-_TWICE = "Puck 3 answers more often than it is asked"
-_EARLY = "The arm was activated before it was asked for."
+_TWICE = "Puck 3 sends more replies than there are requests"
+_EARLY = "The arm was activated before the screen asked for it."
 _NAN = "A position or torque was not a number."
 _CANNOT_COUNT = Cell(End.ENDED, "Joint torques are not numbers")
 _HEARTBEAT = f"{_MODULE}heartbeat fault."
 
 _EARLY_ANEW = _not_ready("The arm was not activated within 120 s.")
-_DISOBEYS = "does not do as it is told"
+_DISOBEYS = "does not follow its commands"
 # The modes and torques of all pucks are requested within 0.12 s.
 _CAUGHT = replace(_IDLE, limit_ms=130)
 _SET_ANEW = replace(OK, why="the arm's activation sets the mode of every puck")
@@ -442,7 +442,7 @@ TABLE: dict[str, Row] = {
     "replies-late-3": _late(),
     "puck-late": _late(),
     "suspended-1-s": _ending(
-        "No cycle of the loop was in time for 998 ms",
+        "The control loop missed every deadline for 998 ms",
         replace(_IDLE, limit_ms=1000),
         "loop-lost",
         preflight=_EARLY_ANEW,
@@ -595,11 +595,11 @@ TABLE: dict[str, Row] = {
     ),
     "joint-limit": _limit("Joint 6 at ", "joint-limit"),
     "torque-limit": _limit(
-        "Joint 2 was asked for ",
+        "Joint 2 would need ",
         "torque-limit",
         idle=Cell(
             End.ENDED,
-            "Joint 2 was asked for ",
+            "Joint 2 would need ",
             why="found when the arm becomes active; without torque it falls",
             then="Damping does not slow the arm down: kinetic energy",
         ),

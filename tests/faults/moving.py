@@ -53,7 +53,7 @@ _OWN = {
     "hold-dragged": _ASTRAY,
     "overspeed": _too_fast("Joint 6 "),
     "joint-limit": _too_fast("Joint 6 at "),
-    "torque-limit": _too_fast("Joint 2 was asked for "),
+    "torque-limit": _too_fast("Joint 2 would need "),
     "foot-speed": _too_fast("The foot moved at "),
     "lie-of-motor-3": _IN_VAIN,
     **{f"lie-of-motor-{motor}": _STEP for motor in (1, 2, 5, 6)},

@@ -49,7 +49,10 @@ def holds(seen):
     ("victim", "message"),
     [
         ("console", "No heartbeat from the console for 0.5 s. ARM: holding."),
-        ("recorder", "the recorder was silent for 0.5 s. Is the disk slow? ARM: hold"),
+        (
+            "recorder",
+            "no heartbeat from the recorder for 0.5 s. Is the disk slow? ARM: hold",
+        ),
     ],
 )
 def test_a_process_that_stops_for_a_while_ends_the_trial_only(

@@ -16,7 +16,7 @@ LOOP = " ✔ loop 1 s       456.2 Hz · p99.9 late 1.97 ms · missed {}/490"
         (LOOP.format(0), False),
         ("Node 2 does not answer GET IPNM (86) within 50 ms.", True),
         ("12 late cycles in one second", True),
-        ("Joint 7 was asked for 1.3 N m > 1.3.", False),
+        ("Joint 7 would need 1.4 N m (limit 1.3).", False),
         ("", False),
     ],
 )

@@ -269,9 +269,7 @@ class BusReader:
         self.tally.slowest_ns = max(self.tally.slowest_ns, delay_ns)
         is_late = delay_ns > REPLY_LIMIT_NS
         self.tally.late += is_late
-        return (
-            f", {'LATE: ' if is_late else ''}{delay_ns // 1000} us after the question"
-        )
+        return f", {'LATE: ' if is_late else ''}{delay_ns // 1000} us after the request"
 
     def _expire(self, before_ns: int) -> list[DecodedLine]:
         """Drop the requests sent until `before_ns` and return their lines."""

@@ -383,8 +383,8 @@ class WamArm:
         motor = self._traffic.balance.doubled()
         if motor and self._link.foreign_id is None:  # another master: the loop reports
             raise PreflightError(
-                f"Puck {motor} answers more often than it is asked.",
-                hint="Look for a second puck of that number, a second program, or an "
+                f"Puck {motor} sends more replies than there are requests.",
+                hint="Look for a second puck with this number, a second program, or an "
                 "adapter that repeats frames.",
             )
 
@@ -422,12 +422,12 @@ class WamArm:
         if late_replies := self.counters.stale - stale:
             raise LinkTimeoutError(
                 f"{pucks_do(silent)} not report a position in time: {late_replies} "
-                "replies came after the next question.",
+                "replies came after the next request.",
                 hint="Is the CAN adapter slow (USB), or the bus busy? See: ip -s link.",
             )
         raise LinkTimeoutError(
             f"{pucks_do(silent)} not report a position.",
-            hint="Check the cable, or a puck in reset.",
+            hint="Check cable and power; a puck may be in reset.",
         )
 
 

@@ -111,7 +111,7 @@ def _check_present(stats: dict[int, int], mode: SafetyMode) -> None:
         )
     if missing:
         others = f"{','.join(map(str, present))} do" if present else "none does"
-        hint = "Check its cable or a puck in reset."
+        hint = "Check its cable and power; it may be in reset."
         if missing == _WRIST_NODES:
             hint = (
                 "Is this a four-joint WAM? Traction needs the wrist. Otherwise check "

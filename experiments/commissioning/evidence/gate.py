@@ -96,7 +96,7 @@ def _cause(
     if now - done.ended > timedelta(days=LONGEST_DAYS):
         return f"stale: done more than {LONGEST_DAYS} days ago"
     if is_ahead(done.ended, now):
-        return f"done on {done.ended:%Y-%m-%d %H:%M} UTC, which has not come yet"
+        return f"done on {done.ended:%Y-%m-%d %H:%M} UTC, in the future"
     return ""
 
 

@@ -96,7 +96,7 @@ def test_the_real_rig_without_its_bus_is_a_failed_preflight(tmp_path):
 def test_too_little_disk_space_is_a_failed_preflight(tmp_path):
     config = write_config(tmp_path, rig=("free_disk_gb = 5.0", "free_disk_gb = 1e5"))
     done = run_short(config, tmp_path / "data")
-    assert "GB free, a session needs 0.9 GB, minimum 100000 GB." in done.err
+    assert "GB free; a session needs 0.9 GB (minimum 100000 GB)." in done.err
     assert done.code == 3
 
 

@@ -534,7 +534,7 @@ CASES = {
     "exchange-late": Case(_late_replies, 3, words="in 5 of 5 cycles"),
     "exchange": Case(_no_exchange, 3, words="100 of 100 exchanges"),
     "loop-dead": Case(_no_loop, 3),
-    "ft-lost": Case(_lost_sensor, 3, words="while it was tested: The port is gone."),
+    "ft-lost": Case(_lost_sensor, 3, words="during its test: The port is gone."),
     "not-active": Case(_never_active, 3),
     "no-power": struck_early("estop", E_STOP),
     "not-ready": struck_early("puck-silent", words="Puck 3 has not answered for "),
@@ -546,7 +546,9 @@ CASES = {
     "contact-move": acted(
         Prompt.READY, _meet, 4, words="beyond its weight (limit 0)", since=0.0
     ),
-    "contact-growth": acted(Prompt.RECORDING, _lean, words="while it stood (limit 40)"),
+    "contact-growth": acted(
+        Prompt.RECORDING, _lean, words="while it stood still (limit 40)"
+    ),
     "loop-late": fault("loop-late@T2+0.1s", words="11 late cycles"),
     "overspeed": fault("overspeed@T2+0.1s", words="Joint 6 "),
     "joint7-slip": fault("joint7-slip@T2+0.1s", words="(limit 50)"),
@@ -560,7 +562,7 @@ CASES = {
     ),
     "not-asked-active": Case(_press_early, 4),
     "joint-limit": acted(Prompt.LIFT, _narrow, 4, words="Joint 6 at "),
-    "torque-limit": Case(_weak, 4, words="Joint 2 was asked for"),
+    "torque-limit": Case(_weak, 4, words="Joint 2 would need"),
     "console-silent": acted(Prompt.READY, _deaf, since=0.0),
     "recorder-silent": acted(Prompt.RECORDING, _stuck_recorder),
     "move-refused": acted(Prompt.RECORDING, _move),
@@ -568,7 +570,7 @@ CASES = {
     "tare-moved": tared(text="tare-moved@T2+0.25s", words="Force varied "),
     "residual": tared(text="residual@T2+0s", words="feet.tread.mass 0.450 kg"),
     "tare-without-sensor": replace(
-        tared(_plug_in_another, words="at present: Another F/T sensor was"), code=3
+        tared(_plug_in_another, words="read: Another F/T sensor was"), code=3
     ),
     "tare-poor": tared(_saturate, words="were flagged during tare"),
     "mounting": Case(_turned_sensor, 3, words="degrees about z"),
@@ -586,7 +588,7 @@ CASES = {
     "console-lost": acted(Prompt.READY, _orphan, 4, since=0.0),
     "arm-not-active": acted(Prompt.LIFT, _ask_an_idle_arm, 4),
     "puck-disobeys": struck("mode-lost-4", words="Puck 4 does not"),
-    "puck-doubled": struck("puck-doubled", words="Puck 3 answers more often"),
+    "puck-doubled": struck("puck-doubled", words="Puck 3 sends more replies"),
     "loop-lost": acted(Prompt.LIFT, _stand_still_for_long, 4, "for 200 ms"),
     "process-lost": acted(Prompt.LIFT, _lose_recorder, 4, "recorder process ended"),
     # disk, lock, kill, bug
@@ -600,7 +602,10 @@ CASES = {
     "command-bug": refused(lambda s: _failing_status(s, ZeroDivisionError("so")), 1),
     # impossible requests
     "config": refused(_bad_config, words='cells[0].trials = "ten" - expected a w'),
-    "mismatch": refused(lambda s: _run(s, "S0"), words="S001 is TF, you asked for S0"),
+    "mismatch": refused(
+        lambda s: _run(s, "S0"),
+        words="Session S001 of TF is unfinished, but you asked for S0",
+    ),
     "unfinished": refused(_run, words="S001 TF is unfinished, 1 of 2 kept."),
     "mixed": refused(_mixed),
     "nobody": refused(lambda scene: traction("run", "TF", "--data", scene.data)),

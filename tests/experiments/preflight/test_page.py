@@ -25,7 +25,7 @@ def test_disk_arm_and_sensor_are_all_graded(tmp_path):
     assert done.code == 3
     graded = marks(done)
     assert [graded[name] for name in ("disk", "arm", "F/T")] == [BAD, BAD, BAD]
-    assert "GB free, a session needs" in done.err  # the first of them
+    assert "GB free; a session needs" in done.err  # the first of them
     assert done.out.count("Also: ") == 2
     assert "idle" not in done.out + done.err  # the state of a silent arm is unknown
 

@@ -121,5 +121,5 @@ def test_ctrl_c_in_a_preflight_creates_no_data(config, tmp_path, monkeypatch, ti
     options = ("--fake", "--fast", "--operator-script", "auto", "--config", config)
     done = traction("run", "TF", *options, "--data", tmp_path / "data")
     assert done.code == 130
-    assert done.err == "Interrupted. Nothing that was recorded is lost.\n"
+    assert done.err == "Interrupted. Nothing recorded is lost.\n"
     assert not (tmp_path / "data").exists()

@@ -367,7 +367,7 @@ def test_a_tare_without_sensor_data_names_the_cause(tmp_path, capsys):
     context.rig.backend.stream = {"trouble": "Another F/T sensor was plugged in: 7."}
     take_end_tare(context)
     out = capsys.readouterr().out
-    assert "not read at present: Another F/T sensor was plugged in: 7." in out
+    assert "not being read: Another F/T sensor was plugged in: 7." in out
     assert "flagged" not in out
 
 

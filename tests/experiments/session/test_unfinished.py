@@ -139,7 +139,7 @@ def test_both_terrains_and_both_choices_are_reported(tmp_path, capsys):
     make_session(tmp_path, START, ACTIVE, LEFT)
     press(b"1", find_unfinished(tmp_path), "B0")
     assert capsys.readouterr().out == (
-        "▲ Unfinished session S001 is S10, you asked for B0. [1] resume S10  "
+        "▲ Session S001 of S10 is unfinished, but you asked for B0. [1] resume S10  "
         "[2] close it and start B0  [q]uit\n"
     )
 
@@ -158,9 +158,9 @@ def test_without_a_terminal_a_run_is_refused_with_the_command_to_type(tmp_path, 
     done = run_short(config, tmp_path, "TF")
     assert (done.code, done.out) == (2, "")
     assert done.err == (
-        "Unfinished session S001 is S10, you asked for TF. To go on: traction resume "
-        f"S001 --data {tmp_path}   To close what is unfinished: the same command with "
-        "--new. Nothing was started.\n"
+        "Session S001 of S10 is unfinished, but you asked for TF. To go on: "
+        f"traction resume S001 --data {tmp_path}   To close it: the "
+        "same command with --new. Nothing was started.\n"
     )
     assert len(list((tmp_path / "sessions").glob("*_S*"))) == 1
 

@@ -109,7 +109,9 @@ def test_a_sensor_opens_again_after_closing(kind):
 def test_silence_is_reported_with_power_and_cable(kind):
     bench = SensorBench(kind)
     bench.device.go_silent()
-    with pytest.raises(LinkTimeoutError, match="Check power and cable") as error:
+    with pytest.raises(
+        LinkTimeoutError, match="Check the sensor's power and cable"
+    ) as error:
         bench.sensor.open()
     assert "port open, 0 bytes" in error.value.message
 

@@ -70,7 +70,7 @@ def test_a_frame_is_described(log, frame, words):
 def test_a_reply_states_its_latency(log):
     log(0, "001 44")
     assert log(187 * US, "426 C4 00 00 10 00 00") == (
-        "puck 1 answers CTS = 4096, 187 us after the question"
+        "puck 1 answers CTS = 4096, 187 us after the request"
     )
     tally = log.reader.tally
     assert (tally.questions, tally.answers, tally.late, tally.slowest_ns) == (

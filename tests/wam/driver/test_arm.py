@@ -83,7 +83,7 @@ def test_a_missing_puck_is_reported_with_those_that_answer():
     with pytest.raises(PreflightError) as caught:
         WamArm(rig.link, rig.clock).start()
     assert caught.value.message == "Puck 5 does not answer (1,2,3,4,6,7 do)."
-    assert caught.value.hint == "Check its cable or a puck in reset."
+    assert caught.value.hint == "Check its cable and power; it may be in reset."
 
 
 def test_two_missing_pucks_are_reported_in_the_plural():

@@ -123,7 +123,7 @@ def test_a_second_sender_is_detected_within_a_few_cycles(bench, node, after_ns):
 @pytest.mark.parametrize("after_ns", [0, 50_000, 1_000_000])
 def test_an_arm_with_a_duplicated_puck_is_not_started(bench, after_ns):
     bench.faults.answer_twice(position_reply_id(5), lambda data: data, after_ns)
-    with pytest.raises(PreflightError, match="Puck 5 answers more often"):
+    with pytest.raises(PreflightError, match="Puck 5 sends more replies"):
         bench.arm.start()
 
 
