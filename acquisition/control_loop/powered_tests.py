@@ -107,9 +107,11 @@ class PoweredTestLimits:
     def travel_limits(self, goal: PoweredTestGoal) -> list[tuple[float, float]]:
         """Return the travel limits (low, high) of each joint from its start [rad]."""
         if goal.kind in (PoweredTestKind.REST, PoweredTestKind.SILENCE):
-            return [(-way, way) for way in self.rest]
+            return [(-travel, travel) for travel in self.rest]
         if goal.kind is PoweredTestKind.GRAVITY:
-            return [(-self.gravity * way, self.gravity * way) for way in self.rest]
+            return [
+                (-self.gravity * travel, self.gravity * travel) for travel in self.rest
+            ]
         i = goal.joint - 1
         asides = [self.other_joint_travel(goal.joint, joint) for joint in range(1, 8)]
         limits = [(-aside, aside) for aside in asides]

@@ -90,15 +90,15 @@ def moment_warnings(moment: Array, lever: Array, force: Array) -> list[str]:
     ]
 
 
-def path_warnings(trial: str, way: Array, axes: Array) -> list[str]:
+def path_warnings(trial: str, path: Array, axes: Array) -> list[str]:
     """Warn if the path of a stroke deviates from the stated direction or plane.
 
     Args:
         trial: its name.
-        way: positions of the pressed foot in one stroke [m], shape (n, 3).
+        path: positions of the pressed foot in one stroke [m], shape (n, 3).
         axes: rows x_T, y_T, z_T, shape (3, 3).
     """
-    ahead, aside, above = ((way - way[0]) @ axes.T).T
+    ahead, aside, above = ((path - path[0]) @ axes.T).T
     length = float(np.ptp(ahead))
     if length < SHORTEST:
         return []
@@ -122,7 +122,7 @@ def sign_figures(values: Array, lateral: Array) -> list[SignFigure]:
 
     Args:
         values: v_t [m/s], F_t [N], F_n [N], shape (n, 3).
-        lateral: force across the way [N], shape (n,).
+        lateral: force across the path [N], shape (n,).
 
     Raises:
         SettingsError: the forces cannot come from ground that supports and slows the

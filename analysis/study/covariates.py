@@ -30,7 +30,7 @@ from analysis.study.new_trial import NewTrialFit
 from analysis.study.store import ResultStore
 from analysis.study.tasks import Workers, run_tasks
 
-WAY = "way"  # travel since the last drop, computed from F_t and v_t
+TRAVEL = "way"  # travel since the last drop, computed from F_t and v_t
 SPAN = 0.2  # s over which changes are compared with those of F_t
 REPEATED = 0.3  # share of the changes explained by F_t from which a column repeats it
 FEWEST = 3  # trials
@@ -65,15 +65,15 @@ class CovariateRows:
 
         Args:
             trial: a prepared trial.
-            names: names of the columns; `WAY` is computed. Other inputs are common to
-                all models.
+            names: names of the columns; `TRAVEL` is computed. All models share the
+                other inputs.
             least: decrease in force [N] that counts as a drop.
         """
         smooth, kept = trial.smooth, trial.indices
         inputs = [x[kept] for n, x in smooth.further.items() if n not in names]
         further = np.column_stack(inputs) if inputs else None
         columns = [
-            travel_since_drop(trial, least) if n == WAY else smooth.further[n][kept]
+            travel_since_drop(trial, least) if n == TRAVEL else smooth.further[n][kept]
             for n in names
         ]
         return cls(

@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _fit(args: argparse.Namespace) -> int:
     from acquisition.errors import SettingsError
-    from analysis.study.covariates import WAY
+    from analysis.study.covariates import TRAVEL
     from analysis.tables.columns import parse_covariates, parse_inputs
     from experiments.named_tables import load_named_tables
     from experiments.operator.console import Console
@@ -94,7 +94,7 @@ def _fit(args: argparse.Namespace) -> int:
             f"--covariate and --inputs both name {both}.", hint="Leave one out."
         )
     trials = load_named_tables(args, args.files, inputs, args.stones)
-    table_columns = [name for name in columns if name != WAY]
+    table_columns = [name for name in columns if name != TRAVEL]
     tested = trials
     if table_columns:
         further = (*inputs, *table_columns)

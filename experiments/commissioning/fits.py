@@ -39,7 +39,7 @@ class FootFit:
         mass: mass of the foot [kg].
         weight: weight in the base frame [N], shape (3,).
         centre: centre of mass in the sensor frame [m], shape (3,).
-        way: angle between its weight and down [degrees].
+        tilt_deg: angle between its weight and the vertical.
         force_left: rms residual of a force axis [N].
         moment_left: rms residual of a moment axis [N m].
         lever: ratio of moment to force variations between poses [m].
@@ -48,7 +48,7 @@ class FootFit:
     mass: float
     weight: Array
     centre: Array
-    way: float
+    tilt_deg: float
     force_left: float
     moment_left: float
     lever: float
@@ -61,14 +61,14 @@ class HungFit:
     Attributes:
         scale: measured over known weight in each pose, shape (n,).
         sole: point of attack of the string in the sensor frame [m], shape (3,).
-        way: angle between the weight and down, worst pose [degrees].
+        tilt_deg: angle between the weight and the vertical, worst pose.
         angles: errors of the angles `FITTED` [rad], shape (12,).
         worst: index of the largest angle.
     """
 
     scale: Array
     sole: Array
-    way: float
+    tilt_deg: float
     angles: Array
     worst: int
 
@@ -93,7 +93,7 @@ def fit_foot(values: Values) -> FootFit:
         mass=float(np.linalg.norm(w)) / GRAVITY,
         weight=w,
         centre=moment_solution[3:].astype(np.float64),
-        way=angle(w, _DOWN),
+        tilt_deg=angle(w, _DOWN),
         force_left=_rms(force_residuals),
         moment_left=_rms(moment_residuals),
         lever=_lever(loads),
@@ -114,7 +114,7 @@ def fit_hung(values: Values) -> HungFit:
     return HungFit(
         scale=np.linalg.norm(forces, axis=1) / (number(values, "hung") * GRAVITY),
         sole=sole.astype(np.float64),
-        way=max(tilts),
+        tilt_deg=max(tilts),
         angles=angles,
         worst=int(np.abs(angles).argmax()),
     )

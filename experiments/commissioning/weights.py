@@ -159,7 +159,7 @@ def judge_own_weight(values: Values) -> Judgement:
             judge_quantity(
                 "foot_mass", 100.0 * (fit.mass / number(values, "mass") - 1.0)
             ),
-            judge_quantity("weight_way", fit.way),
+            judge_quantity("weight_way", fit.tilt_deg),
             judge_quantity("foot_centre", centre_error),
             judge_quantity("moment_left", 1e3 * fit.moment_left),
         ]
@@ -178,7 +178,7 @@ def judge_hung_weight(values: Values) -> Judgement:
             judge_quantity(
                 "sole", 1e3 * float(np.linalg.norm(fit.sole - values["sole"]))
             ),
-            judge_quantity("hung_way", fit.way),
+            judge_quantity("hung_way", fit.tilt_deg),
         ]
     )
 

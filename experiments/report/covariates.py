@@ -8,7 +8,7 @@ from analysis.data.series import TractionSeries
 from analysis.report.reduced_trial import TrialFiles
 from analysis.study.covariates import (
     FEWEST,
-    WAY,
+    TRAVEL,
     CovariateResult,
     CovariateRows,
     covariate_results,
@@ -19,7 +19,7 @@ from analysis.study.study import Study
 from analysis.study.tasks import Workers
 from experiments.operator.console import WARNING, Console
 
-KNOWN = (*RECORDED, WAY)  # columns of recordings
+KNOWN = (*RECORDED, TRAVEL)  # columns of recordings
 
 
 def columns_tested(

@@ -119,14 +119,14 @@ class StopPath:
 class JointGrip:
     """Hands on the links that follow a path."""
 
-    def __init__(self, way: JointPath) -> None:
-        self._way = way
+    def __init__(self, path: JointPath) -> None:
+        self._path = path
         self._has_begun = False
 
     @property
     def is_done(self) -> bool:
         """Whether the path has ended; the joints are held there."""
-        return self._way.is_done
+        return self._path.is_done
 
     def step(self, q: Array, support: Array) -> GripTorques:
         """Return the torques of the hands in a cycle.
@@ -136,7 +136,7 @@ class JointGrip:
             support: torques against the remaining weight [N m], shape (7,).
         """
         if not self._has_begun:
-            self._way.begin(q)
+            self._path.begin(q)
             self._has_begun = True
-        wanted, rates = self._way.advance(q)
+        wanted, rates = self._path.advance(q)
         return GripTorques(support + _B * rates, _K, _B, wanted.copy(), _STRONGEST)

@@ -120,7 +120,7 @@ ROWS: dict[str, dict[str, Fields]] = {
         "drifting": (
             "the arm sinks or rises by itself",
             "wrong mass of the foot, wrong calibration of gravity; a motor without torque, with a turned plug, or half of one",
-            "the residual force at the tare; speed limits; energy, speed and way of an arm that holds, is guided, floats or is damped; a motor that a move turns in vain. Not detected where a person who holds the arm bears what a motor does not",
+            "the residual force at the tare; speed limits; energy, speed and travel of an arm that holds, is guided, floats or is damped; a motor that a move turns in vain. Not detected where a person who holds the arm bears what a motor does not",
             "the tare is refused; damp, or idle where damping does not slow it",
             ("torque-limit", *_DEAD, *_REVERSED),
             "",
@@ -814,7 +814,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "none; the share is 0.8 at most, of the lower end of what was found",
             "none needed up to a fifth",
             (),
-            "no energy gained on any closed way at 1.2 times the friction",
+            "no energy gained on any closed path at 1.2 times the friction",
             (
                 "tests/wam/control/test_friction_compensation.py::test_overcompensated_random_motion_never_gains_energy",
                 "tests/wam/control/test_friction_compensation.py::test_uncertain_friction_is_compensated_less",

@@ -10,7 +10,7 @@ from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import TractionSeries
 from analysis.report.sections.beyond_paper.further_columns import covariate_tables
 from analysis.study.covariates import (
-    WAY,
+    TRAVEL,
     CovariateResult,
     CovariateRows,
     covariate_results,
@@ -145,7 +145,7 @@ def test_travel_since_a_drop_begins_at_the_drop():
 
 
 def test_travel_is_a_column_of_any_trial():
-    rows = CovariateRows.of(trials_of(1)[0], (WAY,), 1.5)
+    rows = CovariateRows.of(trials_of(1)[0], (TRAVEL,), 1.5)
     assert rows.columns.shape == (rows.t.size, 1)
     assert rows.rows.further.shape[1] == 3  # the other columns are inputs of all models
 

@@ -86,7 +86,7 @@ MEASURES: Mapping[str, Measure] = {
     "ratio": Measure("F_t/F_n", 0.03, is_log=True),
     "speed": Measure("velocity", _HAND, is_log=True),
     "kept": Measure("kept samples", _HAND, is_log=True),
-    "way": Measure("travel", 0.05, is_log=True),
+    "travel": Measure("travel", 0.05, is_log=True),
     "noise": Measure(
         "change from sample to sample", _HAND, is_log=True, limit=SENSOR_LIMIT
     ),
@@ -152,7 +152,7 @@ def _measures(result: TerrainResult, number: int) -> dict[str, float]:
         "noise": _noise(trial.smooth.F_t),
     }
     if trial.travel > 0.0:
-        values["way"] = math.log(trial.travel)
+        values["travel"] = math.log(trial.travel)
     load, force = float(trial.F_n.mean()), float(trial.F_t.mean())
     if load > 0.0:
         values["load"] = math.log(load)
