@@ -66,18 +66,23 @@ class OperatorKey:
     def label(self) -> str:
         """The key as docs/sessions.md shows it."""
         label = f"`{'space' if self.key == ' ' else self.key}`"
-        reasons = f" and `{min(REJECT_REASONS)}`..`{max(REJECT_REASONS)}`"
+        if self.action is KeyAction.TICK:
+            return f"{label} to `{MAX_STEPS}`"
+        reasons = f" and `{min(REJECT_REASONS)}` to `{max(REJECT_REASONS)}`"
         return label + reasons if self.operand is Operand.REASON else label
 
 
 MAX_STEPS = 9  # steps of a reset, each ticked by its digit
 _CONFIRM = OperatorKey(" ", KeyAction.CONFIRM)
-_QUIT = OperatorKey("q", KeyAction.QUIT, "quit")
-_UNDO = OperatorKey("u", KeyAction.UNDO, "take the newest verdict back, for 10 s")
+_QUIT = OperatorKey("q", KeyAction.QUIT, "end the session")
+_UNDO = OperatorKey(
+    "u", KeyAction.UNDO, "take back the last verdict, within 10 s of it"
+)
 _SHORT = {"1": "off the bed", "3": "frame", "4": "sensor"}  # a line has 80 columns
 _REASONS = "  ".join(
     f"{key} {_SHORT.get(key, reason)}" for key, reason in REJECT_REASONS.items()
 )
+_REASON_LIST = ", ".join(f"{key} {why}" for key, why in REJECT_REASONS.items())
 
 KEYS: Mapping[Prompt, tuple[OperatorKey, ...]] = {
     Prompt.CHOICE: (
@@ -89,63 +94,92 @@ KEYS: Mapping[Prompt, tuple[OperatorKey, ...]] = {
     ),
     Prompt.FOOT: (_CONFIRM, _QUIT),
     Prompt.SUPPORT: (
-        OperatorKey(" ", KeyAction.CONFIRM, "once it is supported"),
+        OperatorKey(
+            " ",
+            KeyAction.CONFIRM,
+            "confirm that you support the arm, and press Shift-activate on the pendant",
+        ),
         _QUIT,
     ),
     Prompt.CONFIRM: (_CONFIRM, _QUIT),
     # Another key than at the other prompts: a stuck pedal or a held key must not
     # confirm a motion of the arm or let it sink.
-    Prompt.MOVE: (OperatorKey("g", KeyAction.CONFIRM, "once it is clear: go"), _QUIT),
+    Prompt.MOVE: (
+        OperatorKey("g", KeyAction.CONFIRM, "let it move, once the space is clear"),
+        replace(_QUIT, help="end without moving"),
+    ),
     Prompt.MOVING: (_QUIT,),
     Prompt.TOUCH: (_CONFIRM, OperatorKey("d", KeyAction.FINISH), _QUIT),
     Prompt.LIFT: (replace(_UNDO, word="undo"), _QUIT),
     Prompt.UNDO: (_CONFIRM, _UNDO, _QUIT),
     Prompt.LAY_DOWN: (
-        OperatorKey("i", KeyAction.CONFIRM, "once it is supported: it goes idle"),
+        OperatorKey("i", KeyAction.CONFIRM, "let it go idle, once you support it"),
     ),
     Prompt.READY: (
-        OperatorKey(" ", KeyAction.RECORD, "record", "[space] record"),
-        OperatorKey("n", KeyAction.NOTE, "note", "[n]ote", "note", Operand.TEXT),
+        OperatorKey(" ", KeyAction.RECORD, "start recording", "[space] record"),
         OperatorKey(
-            "v", KeyAction.VIEW, "view the last review again", "[v]iew last", "view"
+            "n",
+            KeyAction.NOTE,
+            "write a note on the session",
+            "[n]ote",
+            "note",
+            Operand.TEXT,
         ),
         OperatorKey(
-            "p", KeyAction.PAUSE, "pause (the arm holds)", "[p]ause", word="pause"
+            "v", KeyAction.VIEW, "show the last review again", "[v]iew last", "view"
+        ),
+        OperatorKey(
+            "p",
+            KeyAction.PAUSE,
+            "pause: the arm holds until you press `space`",
+            "[p]ause",
+            word="pause",
         ),
         OperatorKey(
             "q",
             KeyAction.QUIT,
-            "quit after this trial, twice: at once",
+            "end the session after the next trial; pressed twice, end it now",
             "[q]uit after this",
             "last",
         ),
         _UNDO,
-        OperatorKey("1", KeyAction.TICK, "to `9` tick off a reset step"),
+        OperatorKey("1", KeyAction.TICK, "tick off a reset step"),
         *(OperatorKey(str(n), KeyAction.TICK) for n in range(2, MAX_STEPS + 1)),
     ),
     Prompt.PAUSED: (_CONFIRM, _QUIT),
     Prompt.DAMPED: (
-        OperatorKey(" ", KeyAction.CONFIRM, "once you hold it: the arm holds again"),
+        OperatorKey(" ", KeyAction.CONFIRM, "make it hold again, once you support it"),
         _QUIT,
     ),
     Prompt.RECORDING: (
-        OperatorKey(" ", KeyAction.STOP, "stop early", "[space] stop early"),
+        OperatorKey(" ", KeyAction.STOP, "end the trial early", "[space] stop early"),
         _QUIT,
     ),
     Prompt.REVIEW: (
-        OperatorKey("k", KeyAction.KEEP, "keep", "[k]eep", "keep"),
+        OperatorKey("k", KeyAction.KEEP, "keep the trial", "[k]eep", "keep"),
         OperatorKey(
             "r",
             KeyAction.REDO,
-            "redo with its reason",
+            f"reject and repeat the trial; the digit is the reason: {_REASON_LIST}",
             f"[r]edo: {_REASONS}",
             "redo",
             Operand.REASON,
         ),
         OperatorKey(
-            "n", KeyAction.NOTE, "note on this trial", "[n]ote", "remark", Operand.TEXT
+            "n",
+            KeyAction.NOTE,
+            "write a note on the trial",
+            "[n]ote",
+            "remark",
+            Operand.TEXT,
         ),
-        OperatorKey("q", KeyAction.QUIT, "quit", word="quit"),
+        OperatorKey(
+            "q",
+            KeyAction.QUIT,
+            "end the session after this verdict; pressed twice, or after an incomplete "
+            "trial, reject the trial and end now",
+            word="quit",
+        ),
     ),
 }
 # How to go on after a fault, by prompt; None: the session has ended.
@@ -160,10 +194,10 @@ STOP_KEYS = "Ctrl-C finish safely, twice = stop now"
 
 # Prompts whose keys docs/sessions.md explains, with their descriptions there.
 _EXPLAINED = {
-    Prompt.SUPPORT: "the arm is to be activated",
-    Prompt.DAMPED: "the arm is damped after overspeed",
-    Prompt.MOVE: "the arm is to move by itself",
-    Prompt.LAY_DOWN: "the arm is to go idle",
+    Prompt.SUPPORT: "before the arm is activated",
+    Prompt.DAMPED: "the arm is damped after it moved too fast",
+    Prompt.MOVE: "before the arm moves by itself",
+    Prompt.LAY_DOWN: "before the arm goes idle",
     Prompt.READY: "between two trials",
     Prompt.RECORDING: "while recording",
     Prompt.REVIEW: "at the review",
@@ -209,6 +243,6 @@ def key_rows() -> list[str]:
         shown = [entry for entry in KEYS[prompt] if entry.help]
         if prompt is Prompt.RECORDING:
             shown = [entry for entry in shown if entry.screen]
-        keys = ", ".join(f"{entry.label} {entry.help}" for entry in shown)
-        rows.append(f"| {when} | {keys} |")
+        cells = [f"{entry.label} | {entry.help} |" for entry in shown]
+        rows += [f"| {when} | {cells[0]}", *(f"| | {cell}" for cell in cells[1:])]
     return rows
