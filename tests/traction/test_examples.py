@@ -38,12 +38,3 @@ def test_the_example_of_the_notebook_page_runs(tmp_path, monkeypatch, workplace)
     monkeypatch.chdir(tmp_path)
     exec(compile(block, str(page), "exec"), {})
     assert {path.name for path in tmp_path.glob("*.pdf")} == {"T01.pdf", "session.pdf"}
-
-
-def test_the_example_of_the_readme_runs(tmp_path, monkeypatch, workplace):
-    page = ROOT / "README.md"
-    (block,) = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
-    (tmp_path / "demo").symlink_to(workplace / "data")
-    monkeypatch.chdir(tmp_path)
-    exec(compile(block, str(page), "exec"), {})
-    assert (tmp_path / "T01.pdf").stat().st_size > 1000
