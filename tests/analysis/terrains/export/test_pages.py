@@ -63,16 +63,6 @@ def test_the_controller_example_is_as_short_as_stated():
     assert len(body) <= 30
 
 
-def test_the_example_in_cpp_prints_medians(folder):
-    flags = ("-std=c++17", "-Wall", "-Wextra", "-Werror")
-    program = build(folder, block("controller.md", "cpp"), *flags, suffix="cc")
-    done = subprocess.run([program], capture_output=True, text=True, check=True)
-    lines = dict(line.split() for line in done.stdout.splitlines())
-    for name, known in database().terrains.items():
-        median = known.predict(3.5, 0.05).median
-        assert float(lines[name]) == pytest.approx(median, abs=1e-3)
-
-
 def test_the_example_for_simulators_gives_coefficients(tmp_path, monkeypatch):
     database_file(tmp_path)
     monkeypatch.chdir(tmp_path)
