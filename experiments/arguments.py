@@ -318,7 +318,7 @@ def add_reopening_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--operator-script",
         metavar="FILE|auto",
-        help="answers to the reviews (simulation only)",
+        help="keys for the reviews (simulation only)",
     )
     add_allow_missing_option(parser)
     add_fault_option(parser)

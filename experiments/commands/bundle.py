@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="*",
         type=Path,
         metavar="FILE",
-        help="what belongs to it: a bus log, the log of a bug",
+        help="further files, such as a bus log or the log of a bug",
     )
     parser.add_argument(
         "--to", type=Path, metavar="FILE", help="the bundle (SESSION.bundle.zip)"

@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="TOML file with the poses to use",
     )
     parser.add_argument(
-        "--force", action="store_true", help="accept a fit that is refused as bad"
+        "--force", action="store_true", help="accept a fit that would be refused as bad"
     )
 
 

@@ -41,19 +41,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--bus",
         type=number_within(0.1, 3600, "seconds to listen, e.g. 10"),
         metavar="SECONDS",
-        help="only listen: rates, identifiers in words, errors, other masters",
+        help="only listen to the bus: rates, identifiers, errors, other masters",
     )
-    parser.add_argument("--terrain", metavar="NAME", help="row of the matrix (first)")
     parser.add_argument(
-        "--config-only", action="store_true", help="check the settings, no device"
+        "--terrain", metavar="NAME", help="terrain of matrix.toml (the first)"
+    )
+    parser.add_argument(
+        "--config-only", action="store_true", help="check the settings only"
     )
     parser.add_argument(
         "--explain",
         metavar="NAME|all|states",
-        help="more about a message; all of them; the tables of all states",
+        help="explain a message; list all messages; list the states and transitions",
     )
     parser.add_argument(
-        "--json", action="store_true", help="the page as JSON, refusals too"
+        "--json", action="store_true", help="print the page, or the refusal, as JSON"
     )
     add_truth(parser)
     parser.add_argument(

@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--from",
         dest="first",
         metavar="STEP",
-        help="begin with this step and do all from there again, e.g. C8",
+        help="repeat this step and all later ones, e.g. C8",
     )
     parser.add_argument(
         "--until", dest="last", metavar="STEP", help="end after this step, e.g. C4"
@@ -43,17 +43,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--terrain",
         metavar="NAME",
-        help="whose container C13 looks at (the first of matrix.toml)",
+        help="terrain whose container C13 checks (the first of matrix.toml)",
     )
     parser.add_argument(
         "--daily",
         action="store_true",
-        help="2 min before a session: is the arm still as it was commissioned?",
+        help="check in two minutes that the arm is still as it was commissioned",
     )
     parser.add_argument(
         "--recheck",
         action="store_true",
-        help="judge the recordings again, no device is touched",
+        help="evaluate the recordings again, without the arm",
     )
     parser.add_argument(
         "--moved",
@@ -65,7 +65,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="a drive cable was tensioned or replaced: C5 to C11 are stale",
     )
-    parser.add_argument("--operator", metavar="NAME", help="who does it (login name)")
+    parser.add_argument(
+        "--operator", metavar="NAME", help="name of the operator (your login)"
+    )
     add_arm(parser)
 
 

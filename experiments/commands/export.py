@@ -26,9 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "sessions", nargs="*", metavar="SESSION", help="S012 or a folder"
     )
-    parser.add_argument(
-        "--to", type=Path, metavar="DIR", help="into an empty or new folder"
-    )
+    parser.add_argument("--to", type=Path, metavar="DIR", help="new or empty folder")
     add_allow_missing_option(parser)
     add_seed_option(parser)
     trials = parser.add_argument_group("trials: SESSION... --to DIR")
@@ -48,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--terrain-db",
         type=Path,
         metavar="FILE",
-        help="the terrain database, JSON: written, or read where --for is given",
+        help="terrain database (JSON): written, or read if --for is given",
     )
     _add_targets(parser)
 
@@ -68,7 +66,9 @@ def _add_targets(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--terrain", metavar="NAME,..", help="terrains of the database (all)"
     )
-    group.add_argument("--model", metavar="NAME", help="one of its models (default)")
+    group.add_argument(
+        "--model", metavar="NAME", help="model of the database (its default)"
+    )
     group.add_argument(
         "--float", action="store_true", help="single precision in C (double)"
     )

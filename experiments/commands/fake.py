@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--serial",
         type=Path,
         metavar="PATH",
-        help="serve a serial wrist sensor at this new path; alone, or on the arm",
+        help="serve a serial wrist sensor at this new path, with the arm or alone",
     )
     parser.add_argument(
         "--sensor",
@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--idle-first",
         action="store_true",
-        help="begin powered and idle, pucks asleep; otherwise in E-STOP",
+        help="start idle, with the pucks asleep, instead of in E-STOP",
     )
     _add_arm(parser)
     _add_truth(parser)
@@ -53,13 +53,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--script",
         type=Path,
         metavar="FILE",
-        help="lines that press the pendant and order the hands at the arm, as on "
-        "stdin: [SECONDS] activate|idle|estop|quit, pose q1..q7 SECONDS, "
+        help="lines that operate the pendant and the simulated hands, as on stdin: "
+        "[SECONDS] activate|idle|estop|quit, pose q1..q7 SECONDS, "
         "stop JOINT low|high, hang KG, unhang, push FX FY FZ SECONDS, "
         "twist N_M SECONDS, release",
     )
     parser.add_argument(
-        "--can-log", type=Path, metavar="FILE", help="write every frame there"
+        "--can-log", type=Path, metavar="FILE", help="write every CAN frame to FILE"
     )
 
 
@@ -68,21 +68,20 @@ def _add_arm(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--bare",
         action="store_true",
-        help="the arm by itself, as a program that moves it expects it: short for "
-        "--hand none --tool none",
+        help="the arm alone: short for --hand none --tool none",
     )
     parser.add_argument(
         "--hand",
         choices=("carry", "none"),
-        help="carry (default): a person holds the foot where it is, with little "
-        "joint friction; none: free, with the friction of a real arm",
+        help="carry (default): a person holds the foot in place, with little joint "
+        "friction; none: the arm is free, with the friction of a real arm",
     )
     parser.add_argument(
         "--tool",
         metavar="FOOT|none|FILE",
-        help="what is mounted on the tool plate: a foot of rig.toml below the wrist "
-        "sensor (default: that of the first terrain), nothing and no sensor, or the "
-        "foot of a TOML file with mass [kg], com [m], inertia [kg m2], sole [m]",
+        help="what is mounted on the tool plate: the wrist sensor and a foot of "
+        "rig.toml (default: that of the first terrain), neither, or the sensor and "
+        "the foot of a TOML file with mass [kg], com [m], inertia [kg m2], sole [m]",
     )
     parser.add_argument(
         "--firmware",
@@ -99,15 +98,15 @@ def _add_truth(parser: argparse.ArgumentParser) -> None:
         "--pose",
         choices=("home", "rest"),
         default="home",
-        help="where it is: home (default), or rest: home with joint 6 on its upper "
+        help="initial pose: home (default), or rest: home with joint 6 on its upper "
         "stop, where nothing moves without torque",
     )
     parser.add_argument(
         "--seed",
         type=whole_number,
         metavar="N",
-        help="one of many sound arms: zeros, stops, mounting and sensor are drawn "
-        "(those of the drawings)",
+        help="random fault-free arm: zeros, stops, mounting and sensor are drawn with "
+        "this seed (default: as in the drawings)",
     )
     parser.add_argument(
         "--friction",

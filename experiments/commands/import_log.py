@@ -43,29 +43,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "log",
         type=Path,
         metavar="LOG",
-        help=".mcap, .db3 or folder of rosbag2, or ROS 1 .bag",
+        help=".mcap file, .db3 file or folder of rosbag2, or ROS 1 .bag file",
     )
     parser.add_argument(
         "--list",
         action="store_true",
-        help="only say what log and URDF hold; with --foot, --sensor and --acts also "
-        "the command line, with every value that the log shows",
+        help="list the contents of log and URDF; with --foot, --sensor and --acts also "
+        "a complete command line with the values estimated from the log",
     )
-    parser.add_argument("--to", type=Path, metavar="DIR", help="tables, a new folder")
-    parser.add_argument("--urdf", type=Path, metavar="FILE", help="of the robot")
+    parser.add_argument(
+        "--to", type=Path, metavar="DIR", help="new folder of the tables"
+    )
+    parser.add_argument("--urdf", type=Path, metavar="FILE", help="URDF of the robot")
     _add_wrench(parser)
     _add_ground(parser)
-    parser.add_argument("--joints", metavar="TOPIC", help="of several JointStates")
+    parser.add_argument(
+        "--joints", metavar="TOPIC", help="topic of the joints, if there are several"
+    )
     parser.add_argument(
         "--clock",
         choices=("stamp", "receipt"),
-        help="whose times count where stamps and receipts disagree",
+        help="clock to use if sender and recorder disagree",
     )
     parser.add_argument(
-        "--trials", metavar="T0:T1,..", help="seconds of the log, a trial each"
+        "--trials", metavar="T0:T1,..", help="one interval of the log per trial [s]"
     )
     parser.add_argument(
-        "--slow", action="store_true", help="take rates below 50 Hz, for means only"
+        "--slow", action="store_true", help="accept rates below 50 Hz, for means only"
     )
     parser.add_argument(
         "--format",
@@ -77,49 +81,57 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _add_wrench(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("wrench")
-    group.add_argument("--wrench", metavar="TOPIC", help="of several WrenchStampeds")
-    group.add_argument("--sensor", metavar="LINK", help="link of the URDF it reads in")
+    group.add_argument(
+        "--wrench", metavar="TOPIC", help="topic of the wrench, if there are several"
+    )
+    group.add_argument(
+        "--sensor",
+        metavar="LINK",
+        help="link of the URDF in whose frame the wrench is expressed",
+    )
     group.add_argument(
         "--acts",
         choices=("ground-on-foot", "foot-on-ground"),
-        help="what its numbers are; no message says it",
+        help="force that the wrench states: of the ground on the foot, or the reaction",
     )
     group.add_argument(
         "--tare",
         metavar="T0:T1|..",
-        help="seconds of the log with the foot free, six numbers with commas, or "
-        "none for a sensor that is tared",
+        help="interval of the log [s] in which the foot is free, the reading without "
+        "load (six numbers), or none if the sensor is tared",
     )
     group.add_argument(
         "--tool-mass",
         type=number_within(0, 20, "a mass of 0 to 20 kg, e.g. 0.21"),
         metavar="KG",
-        help="of everything below the gauges",
+        help="mass of everything below the strain gauges",
     )
     group.add_argument(
         "--lag",
         metavar="MS",
-        help="how late the wrench is stamped against the joints; 0 where it is not",
+        help="delay of the wrench's time stamps relative to the joints; 0 is allowed",
     )
     group.add_argument(
         "--estimated",
         action="store_true",
-        help="the robot estimates it, no sensor measures it; marked everywhere",
+        help="the robot estimates the wrench from motor torques; marked on every page",
     )
 
 
 def _add_ground(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("foot and ground, in axes of the base")
-    group.add_argument("--foot", metavar="LINK", help="of the URDF: the sole")
+    group.add_argument("--foot", metavar="LINK", help="link of the URDF: the sole")
     group.add_argument("--along", metavar="X,Y,Z", help="direction of the slip")
-    group.add_argument("--normal", metavar="X,Y,Z", help="of the ground")
-    group.add_argument("--terrain", default="table", metavar="NAME", help="its name")
+    group.add_argument("--normal", metavar="X,Y,Z", help="normal of the ground")
+    group.add_argument(
+        "--terrain", default="table", metavar="NAME", help="name of the ground (table)"
+    )
     group.add_argument(
         "--factor",
         action="append",
         default=[],
         metavar="K=V",
-        help="what else is known of it, e.g. d50=19; more than once for several",
+        help="property of the ground, e.g. d50=19; can be repeated",
     )
 
 

@@ -5,13 +5,13 @@ from pathlib import Path
 
 EXAMPLES = """\
   traction init                             into this folder
-  traction init lab                         into lab/, made where it is missing"""
+  traction init lab                         into lab/, created if it is missing"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `init`."""
     parser.add_argument(
-        "folder", nargs="?", type=Path, default=Path(), metavar="DIR", help="where (.)"
+        "folder", nargs="?", type=Path, default=Path(), metavar="DIR", help="folder (.)"
     )
 
 

@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--all", action="store_true", help="every session with trials")
     parser.add_argument(
-        "--to", type=Path, required=True, metavar="DIR", help="an empty or new folder"
+        "--to", type=Path, required=True, metavar="DIR", help="new or empty folder"
     )
     parser.add_argument(
         "--author",
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--title", default="", metavar="TEXT", help="title of the study"
     )
     parser.add_argument(
-        "--description", default="", metavar="TEXT", help="a sentence or two"
+        "--description", default="", metavar="TEXT", help="description of the study"
     )
     add_allow_missing_option(parser)
     add_seed_option(parser)

@@ -30,15 +30,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--to",
         type=Path,
         metavar="DIR",
-        help="folder of the report and of what it keeps, e.g. where the data can only "
-        "be read (that of the session, or DATA/study)",
+        help="folder of the report and of stored results, e.g. if the data are "
+        "read-only (that of the session, or DATA/study)",
     )
     add_scheduler_option(parser)
     add_covariate_option(
-        parser, "height (of the sole), way (since the last drop), lateral, tilt, moment"
+        parser,
+        "height (of the sole), way (distance since the last drop of F_t), lateral, "
+        "tilt, moment",
     )
     add_pdf_option(parser)
-    parser.add_argument("--json", action="store_true", help="what was made, as JSON")
+    parser.add_argument("--json", action="store_true", help="print the results as JSON")
     add_allow_missing_option(parser)
     add_seed_option(parser)
     add_analysis_options(parser)

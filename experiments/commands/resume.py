@@ -17,7 +17,7 @@ EXAMPLES = """\
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `resume`."""
     parser.add_argument(
-        "session", nargs="?", metavar="SESSION", help="S012, a folder, or left out"
+        "session", nargs="?", metavar="SESSION", help="S012 or a folder (the only one)"
     )
     add_reopening_options(parser)
 

@@ -28,18 +28,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--install", action="store_true", help="write the files and run the commands"
     )
     parser.add_argument(
-        "--user", metavar="NAME", help="who runs sessions (who called sudo, or you)"
+        "--user",
+        metavar="NAME",
+        help="user who runs sessions (who called sudo, or you)",
     )
     parser.add_argument(
         "--sensor-serial",
         metavar="TEXT",
-        help="serial number of the sensor's adapter, where it is not plugged in",
+        help="serial number of the sensor's adapter, if it is not plugged in",
     )
     parser.add_argument(
         "--root",
         type=Path,
         metavar="DIR",
-        help="install into the image of a system in this folder; nothing is run",
+        help="install into the system image in this folder; no command is run",
     )
 
 

@@ -14,7 +14,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("session", metavar="SESSION", help="S012 or a folder")
     parser.add_argument("trial", metavar="TRIAL", help="T04, or T04a of rejected/")
     parser.add_argument("verdict", choices=("keep", "reject"), help="the new verdict")
-    parser.add_argument("reason", nargs="+", metavar="REASON", help="why")
+    parser.add_argument(
+        "reason", nargs="+", metavar="REASON", help="reason for the journal"
+    )
     add_author_option(parser)
 
 

@@ -12,7 +12,7 @@ EXAMPLES = """\
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `watch`."""
     parser.add_argument(
-        "session", nargs="?", metavar="SESSION", help="S012 (the one that is recorded)"
+        "session", nargs="?", metavar="SESSION", help="S012 (the one being recorded)"
     )
     add_port_option(parser)
 
