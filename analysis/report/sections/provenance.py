@@ -26,8 +26,8 @@ def settings_table(study: Study, *, is_foreign: bool) -> ReportTable:
         [
             "GP fit",
             f"one length per input, at most {fit.gp_points} samples chosen at random "
-            f"(seed {fit.seed}); marginal likelihood, climbed from a designed start "
-            "and from further proposed points",
+            f"(seed {fit.seed}); marginal likelihood, maximised from several starting "
+            "points",
         ],
         [
             "noise of the GP",
@@ -49,7 +49,7 @@ def _widths(study: Study) -> list[list[str]]:
     averaged = " or ".join(str(width) for width in sorted({w for w, _ in used}))
     thinned = " or ".join(str(every) for every in sorted({e for _, e in used}))
     prepared = sum(trial.is_prepared for trial in trials)
-    remark = f"; {prepared} trials were prepared before" if prepared else ""
+    remark = f"; {prepared} trials had been prepared already" if prepared else ""
     span, step = (1e3 * n / RATE_HZ for n in (prepare.smoothing, prepare.downsample))
     return [
         [

@@ -33,7 +33,7 @@ from analysis.tustin.model import TustinForm
 VALUES = {
     "smoothing": "an odd number of samples, e.g. smoothing=15",
     "window": "slowest:fastest in m/s, e.g. window=0.01:0.2",
-    "lag": "-50 to 50 ms that the force is late, e.g. lag=20",
+    "lag": "delay of the force, -50 to 50 ms, e.g. lag=20",
     "frame": "sole or terrain",
     "inertia": "removed (the force that accelerates the foot) or kept",
     "drift": "interpolated (between the tares) or first (the tare before the trial)",
@@ -128,7 +128,7 @@ def parse_choice(text: str) -> StudyVariant:
     key, _, value = (part.strip() for part in text.partition("="))
     if key not in VALUES:
         raise SettingsError(
-            f"--what-if {text[:60]!r}: there is no choice {key[:30]!r}.", hint=_listed()
+            f"--what-if {text[:60]!r}: unknown choice {key[:30]!r}.", hint=_listed()
         )
     try:
         return _PARSERS[key](value)

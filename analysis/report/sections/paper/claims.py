@@ -224,7 +224,7 @@ CLAIMS: Sequence[Claim] = (
     Claim(
         "IV-B",
         "More than 300 training points do not increase the accuracy.",
-        "trials with more rows than a process was given",
+        "trials with more rows than a process is fitted to",
         models.gain_of_more_rows,
         agrees=[_below("largest gain", 0.05)],
         partly=[_at_most("better", 0)],
@@ -271,7 +271,7 @@ CLAIMS: Sequence[Claim] = (
         "The GP takes the noise of the stones into its variance.",
         "two trials on stones",
         models.band_coverage,
-        agrees=[_below("off nominal beyond its slack", 0.0)],
+        agrees=[_below("deviation beyond tolerance", 0.0)],
     ),
     Claim(
         "IV-D",

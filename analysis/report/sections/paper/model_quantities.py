@@ -199,7 +199,7 @@ def band_coverage(evidence: PaperEvidence) -> ClaimResult | None:
     )
     off = abs(mean - _BAND) - max(2.0 * error, _BAND_SLACK)
     numbers = {"coverage": mean, "error": error}
-    return ClaimResult(text, numbers, {"off nominal beyond its slack": off})
+    return ClaimResult(text, numbers, {"deviation beyond tolerance": off})
 
 
 def plate_error(evidence: PaperEvidence) -> ClaimResult | None:

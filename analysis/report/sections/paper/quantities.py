@@ -39,7 +39,7 @@ def beyond_chance(pairs: Sequence[PairedComparison], sign: int, unit: str) -> st
     if smallest_adjusted(pairs) < SIGNIFICANT:
         return text
     trials = min(pair.trials for pair in pairs)
-    return f"{text} ({trials} trials are too few to show it of {len(pairs)})"
+    return f"{text} ({trials} trials are too few to show a difference in {len(pairs)})"
 
 
 def count_significant(pairs: Sequence[PairedComparison], sign: int) -> int:

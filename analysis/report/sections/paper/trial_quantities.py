@@ -85,7 +85,9 @@ def sag(evidence: PaperEvidence) -> ClaimResult | None:
         return None
     count = sum(slip.has_sag for slip in slips)
     share = count / len(slips)
-    text = f"{count} of {len(slips)} slips on stones ({share:.0%}) follow such a sag."
+    text = (
+        f"{count} of {len(slips)} slips on stones ({share:.0%}) follow such a decrease."
+    )
     return ClaimResult(text, {"share": share})
 
 

@@ -81,7 +81,7 @@ class Measure:
 
 
 MEASURES: Mapping[str, Measure] = {
-    "residual": Measure("F_t of the same load and velocity", 0.1, unit="N"),
+    "residual": Measure("F_t at the same load and velocity", 0.1, unit="N"),
     "load": Measure("normal force", _HAND, is_log=True),
     "ratio": Measure("F_t/F_n", 0.03, is_log=True),
     "speed": Measure("velocity", _HAND, is_log=True),

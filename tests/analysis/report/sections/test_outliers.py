@@ -44,7 +44,7 @@ def test_similar_trials_have_no_outlier():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda s: replace(s, F_t=s.F_t + 2.0), "F_t of the same load and velocity +2"),
+        (lambda s: replace(s, F_t=s.F_t + 2.0), "F_t at the same load and velocity +2"),
         (lambda s: replace(s, F_n=s.F_n + 4.0), "F_t/F_n 0."),
         (lambda s: replace(s, v_t=0.3 * s.v_t), "velocity 0."),
         (
