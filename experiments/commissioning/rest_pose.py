@@ -353,7 +353,7 @@ def judge_gravity_ramp(values: Values) -> Judgement:
         [
             *rows,
             *_ended_row(values),
-            judge_quantity("share", share, text="It ended early"),
+            judge_quantity("share", share, text="The ramp ended early"),
         ]
     )
 

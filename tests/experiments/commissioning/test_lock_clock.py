@@ -69,7 +69,7 @@ def test_a_sound_arm_passes():
 
 @pytest.mark.parametrize("lag", [-0.006, 0.006, 0.02])
 def test_a_lag_of_the_forces_is_reported(lag):
-    assert cause(**rocked(lag)).startswith("forces behind positions")
+    assert cause(**rocked(lag)).startswith("delay of forces")
 
 
 def test_a_foot_that_was_hardly_rocked_is_reported():
