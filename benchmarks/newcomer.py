@@ -2,10 +2,9 @@
 
     python -m benchmarks.newcomer [--without "make test"]
 
-The commands of README and then its Python example run in an empty home folder with a
-minimal environment; the repository is cloned from this one. Commands run in a terminal
-of 80 x 24 and get the keys that their screens ask for. The first failure ends the run
-and its last output is printed.
+The repository is cloned from this one into an empty home folder, and README's commands
+run there with a minimal environment. They run in a terminal of 80 x 24 and get the keys
+that their screens ask for. The first failure ends the run and its last output is printed.
 """
 
 import argparse
@@ -26,8 +25,8 @@ from pathlib import Path
 from benchmarks.readme import README, ROOT
 from benchmarks.surroundings import surroundings
 
-ADDRESS = "URL-OF-THIS-REPOSITORY"
-_BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+_CLONE = f"git clone {ROOT} traction && cd traction"
+_BLOCK = re.compile(r"^```\n(.*?)^```", re.MULTILINE | re.DOTALL)
 _COMMENT = re.compile(r"\s{2,}#.*")
 # Environment variables passed on: path, language and the source of packages.
 _PASSED_ON = re.compile("PATH$|LANG$|PIP_|SSL_|HTTPS?_PROXY")
@@ -56,19 +55,9 @@ class Step:
 
 
 def commands_of(page: str) -> list[str]:
-    """Return the commands of README's code blocks without a language, in order."""
-    lines = [
-        line
-        for language, block in _BLOCK.findall(page)
-        if not language
-        for line in block.splitlines()
-    ]
+    """Return the commands of README's code blocks, in order."""
+    lines = [line for block in _BLOCK.findall(page) for line in block.splitlines()]
     return [_COMMENT.sub("", line).strip() for line in lines if line.strip()]
-
-
-def example_of(page: str) -> str:
-    """Return README's Python example."""
-    return next(block for language, block in _BLOCK.findall(page) if language)
 
 
 class Newcomer:
@@ -82,12 +71,11 @@ class Newcomer:
 
     def type(self, text: str) -> Step:
         """Run one line in the shell and press the keys that its screen asks for."""
-        line = text.replace(ADDRESS, str(ROOT))
         screen, program = pty.openpty()
         fcntl.ioctl(program, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
         start = time.monotonic()
         process = subprocess.Popen(
-            ["bash", "-c", f"{line}\npwd > '{self._folder_file}'"],
+            ["bash", "-c", f"{text}\npwd > '{self._folder_file}'"],
             cwd=self.folder,
             env=self._environment,
             stdin=program,
@@ -149,15 +137,14 @@ def print_step(step: Step) -> Step:
 
 def walk(home: Path, without: list[str]) -> list[Step]:
     """Run README's commands up to the first failure; return the steps."""
-    page = README.read_text()
     user = Newcomer(home)
     steps = list[Step]()
-    for text in (x for x in commands_of(page) if x not in without):
+    for text in (_CLONE, *commands_of(README.read_text())):
+        if text in without:
+            continue
         steps.append(print_step(user.type(text)))
         if steps[-1].code:
-            return steps
-    (user.folder / "example.py").write_text(example_of(page))
-    steps.append(print_step(user.type(".venv/bin/python example.py")))
+            break
     return steps
 
 
