@@ -3,8 +3,8 @@
     python -m benchmarks.newcomer [--without "make test"]
 
 The repository is cloned from this one into an empty home folder, and README's commands
-run there with a minimal environment. They run in a terminal of 80 x 24 and get the keys
-that their screens ask for. The first failure ends the run and its last output is printed.
+run there with a minimal environment, in a terminal of 80 x 24, and get the keys that
+their screens ask for. The first failure ends the run and its last output is printed.
 """
 
 import argparse
