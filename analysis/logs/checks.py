@@ -237,20 +237,36 @@ def clock_check(record: LegRecord) -> Check:
 
 
 def normal_check(judged: AppliedImport) -> Check:
-    """Check the normal by the path of the pressed foot."""
+    """Check the normal by the path of the pressed foot, together and in each trial."""
     pressed = judged.in_trials & (judged.values[:, 2] > PRESSED_FORCE)
-    estimate = find_normal(judged.record.path.foot[pressed])
-    stated, warning = judged.axes[2], ""
-    if estimate.value:
-        # along the path only: a straight one shows no tilt to its side
-        along = float(np.array(estimate.value) @ judged.axes[0])
-        tilt = math.degrees(math.asin(min(1.0, abs(along))))
-        if tilt > LARGEST_TILT + estimate.spread[0]:
-            warning = (
-                f"--normal is {tilt:.1f} degrees off the foot's path (limit "
-                f"{LARGEST_TILT:g} and {estimate.spread[0]:.1f} of the path)"
-            )
-    return _check("normal", tuple(stated.tolist()), "", estimate, warning)
+    foot = judged.record.path.foot
+    estimate = find_normal(foot[pressed])
+    warning = _tilt_warning(estimate, judged.axes[0])
+    if not warning:
+        of_trials = {
+            f"T{number:02d}": find_normal(foot[first:end][pressed[first:end]])
+            for number, (first, end) in enumerate(judged.spans, 1)
+        }
+        warning = "; ".join(
+            f"{name}: {text}"
+            for name, of_trial in of_trials.items()
+            if (text := _tilt_warning(of_trial, judged.axes[0]))
+        )
+    return _check("normal", tuple(judged.axes[2].tolist()), "", estimate, warning)
+
+
+def _tilt_warning(normal: Estimate, x_T: Array) -> str:
+    """Compare along the path only: a straight one shows no tilt to its side."""
+    if not normal.value:
+        return ""
+    along = float(np.array(normal.value) @ x_T)
+    tilt = math.degrees(math.asin(min(1.0, abs(along))))
+    if tilt <= LARGEST_TILT + normal.spread[0]:
+        return ""
+    return (
+        f"--normal is {tilt:.1f} degrees off the foot's path (limit "
+        f"{LARGEST_TILT:g} and {normal.spread[0]:.1f} of the path)"
+    )
 
 
 def direction_check(judged: AppliedImport) -> Check:

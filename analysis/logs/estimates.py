@@ -284,7 +284,8 @@ def find_normal(foot: Array) -> Estimate:
             f"the pressed foot moves {extents[0] * 1e3:.0f} mm, "
             f"{SHORTEST_PATH * 1e3:.0f} mm are needed"
         )
-    is_plane = extents[1] >= _WIDE
+    is_wide = abs(axes[2, 2]) >= abs(axes[1, 2])  # sideways; a heave is no width
+    is_plane = extents[1] >= _WIDE and is_wide
     if is_plane:
         normal, how = axes[2], "plane of the pressed foot's path"
     else:

@@ -10,7 +10,6 @@ from acquisition.errors import SettingsError
 from analysis.data.plausibility import (
     FEWEST,
     HEADING,
-    INCLINE,
     SHORTEST,
     SLOWEST,
     UNEVEN,
@@ -91,30 +90,25 @@ def moment_warnings(moment: Array, lever: Array, force: Array) -> list[str]:
 
 
 def path_warnings(trial: str, path: Array, axes: Array) -> list[str]:
-    """Warn if the path of a stroke deviates from the stated direction or plane.
+    """Warn if the path of a stroke deviates from the stated direction.
 
     Args:
         trial: its name.
         path: positions of the pressed foot in one stroke [m], shape (n, 3).
         axes: rows x_T, y_T, z_T, shape (3, 3).
     """
-    ahead, aside, above = ((path - path[0]) @ axes.T).T
+    ahead, aside, _ = ((path - path[0]) @ axes.T).T
     length = float(np.ptp(ahead))
     if length < SHORTEST:
         return []
-    warnings: list[str] = []
-    for option, limit, other in (
-        ("--along", HEADING, aside),
-        ("--normal", INCLINE, above),
-    ):
-        angle = float(np.degrees(np.arctan(np.polyfit(ahead, other, 1)[0])))
-        deviation = length * np.tan(np.radians(abs(angle)))
-        if abs(angle) > limit and deviation > UNEVEN:
-            warnings.append(
-                f"{trial}: the foot's path is {angle:+z.1f} degrees off {option} "
-                f"(limit {limit:g})"
-            )
-    return warnings
+    angle = float(np.degrees(np.arctan(np.polyfit(ahead, aside, 1)[0])))
+    deviation = length * np.tan(np.radians(abs(angle)))
+    if abs(angle) <= HEADING or deviation <= UNEVEN:
+        return []
+    return [
+        f"{trial}: the foot's path is {angle:+z.1f} degrees off --along (limit "
+        f"{HEADING:g})"
+    ]
 
 
 def sign_figures(values: Array, lateral: Array) -> list[SignFigure]:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.logs.estimates import find_quiet
+from analysis.logs.estimates import find_normal, find_quiet
 
 RATE = 500.0
 T = np.arange(0.0, 12.0, 1.0 / RATE)
@@ -26,3 +26,12 @@ def test_a_quiet_foot_is_found_behind_any_filter(cut_off):
     quiet = find_quiet(T, readings(cut_off), HEIGHT)
     assert quiet[IS_LIFTED].mean() > 0.9
     assert not quiet[~IS_LIFTED].any()
+
+
+def test_a_heaving_path_is_no_plane_with_a_level_normal():
+    """Of a foot that rises and falls by 30 mm along a straight path."""
+    x = np.linspace(0.0, 0.5, 200)
+    foot = np.column_stack([x, np.zeros(200), 0.015 * np.sin(60.0 * x)])
+    normal = find_normal(foot)
+    assert normal.value == pytest.approx((0.0, 0.0, 1.0), abs=0.05)
+    assert "assumed level sideways" in normal.how

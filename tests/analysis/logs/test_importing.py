@@ -101,7 +101,7 @@ def test_checks_confirm_correct_statements(imported):
         ({"tare": (1.5, 5.0)}, "halves of the window of --tare differ by"),
         ({"tare": np.array([3.0, -7.0, 9.0, 0, 0, 0])}, "the free foot reads 2.7 N"),
         ({"along": np.array([1.0, 0.2, 0.0])}, "degrees off --along"),
-        ({"normal": np.array([0.2, 0.0, 1.0])}, "degrees off --normal"),
+        ({"normal": np.array([0.2, 0.0, 1.0])}, "--normal is 11.3 degrees off"),
         ({"normal": np.array([0.035, 0.0, 1.0])}, "--normal is 2.0 degrees off"),
         ({"lag": 0.4}, "--lag 400 ms: the clocks are"),
     ],
@@ -113,6 +113,17 @@ def test_a_check_that_disagrees_is_reported_and_not_applied(
     assert any(words in text for text in found.warnings), found.warnings
     traction = found.trials[0].traction
     assert not np.array_equal(right.trials[0].traction, traction, equal_nan=True)
+
+
+def test_each_disagreement_of_a_path_is_reported_once(right, imported):
+    for options in (
+        {"along": np.array([1.0, 0.2, 0])},
+        {"normal": np.array([0.2, 0, 1.0])},
+    ):
+        found = imported(TURNED, **options)
+        of_path = [text for text in found.warnings if "foot's path" in text]
+        assert len(of_path) == 1, of_path
+    assert not any("foot's path" in text for text in right.warnings)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,47 @@
+"""Checks of stated values against the paths and forces of made trials."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from analysis.logs.checks import LARGEST_TILT, AppliedImport, normal_check
+from ft_sensor.payload import Payload
+
+ROWS = 200  # of a trial
+
+
+def judged_of(foot, values, spans):
+    """An import with these paths [m] and values; everything else is zero."""
+    count = len(foot)
+    record = SimpleNamespace(
+        path=SimpleNamespace(foot=foot), t=np.arange(float(count)) * 0.002
+    )
+    payload = Payload(0.0, np.zeros(3), np.eye(3), 1.0, np.zeros(6))
+    force = np.column_stack([-values[:, 1], np.zeros(count), values[:, 2]])
+    raw = np.hstack([force, np.zeros((count, 3))])
+    return AppliedImport(record, spans, np.eye(3), payload, raw, force, values)
+
+
+def strokes(*slopes_deg):
+    """Strokes of 0.5 m, each on ground of one slope."""
+    ahead = np.linspace(0.0, 0.5, ROWS)
+    level = np.zeros(ROWS)
+    paths = [
+        np.column_stack([ahead, level, np.tan(np.radians(slope)) * ahead])
+        for slope in slopes_deg
+    ]
+    values = np.tile([0.06, 6.0, 10.0], (ROWS * len(paths), 1))
+    spans = [(k * ROWS, (k + 1) * ROWS) for k in range(len(paths))]
+    return judged_of(np.concatenate(paths), values, spans)
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.8 * LARGEST_TILT])
+def test_a_normal_within_its_limit_is_not_reported(slope):
+    assert normal_check(strokes(slope, 0.0)).warning == ""
+
+
+def test_the_trial_whose_ground_has_another_slope_is_named():
+    warning = normal_check(strokes(0.0, 5.0)).warning
+    assert "T02: --normal is 5.0 degrees off" in warning
+    assert "T01" not in warning
