@@ -235,3 +235,17 @@ def test_impossible_options_are_refused_with_a_remedy(imported, options, why):
     with pytest.raises(SettingsError, match=why) as error:
         imported(StrokeLog(), **options)
     assert error.value.hint or "nearest" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "options", [{"trials": [(50.0, 51.0)]}, {"tare": (50.0, 60.0)}], ids=str
+)
+def test_a_span_beyond_a_cut_log_is_refused_with_the_cut(written, tmp_path, options):
+    whole = next(written(StrokeLog(), write_bag2).glob("*.mcap"))
+    data = whole.read_bytes()
+    cut, urdf = tmp_path / "cut.mcap", write_urdf(tmp_path)
+    cut.write_bytes(data[: int(0.8 * len(data))])
+    with pytest.raises(SettingsError, match="holds 0") as error:
+        import_log(import_request(StrokeLog(), cut, urdf, **options))
+    assert "The log goes from 0 to 6." in error.value.hint
+    assert "nothing is read after byte" in error.value.hint

@@ -2,6 +2,12 @@
 
 import pytest
 
+from acquisition.errors import SettingsError
+from analysis.logs.record import RECORD, ImportRecord
+from analysis.tables.loading import load_tables
+from experiments.operator.console import Console
+from experiments.report import external_tables
+from experiments.report.choices import ReportRequest
 from tests.experiments.program import traction
 
 
@@ -24,3 +30,53 @@ def test_the_option_turns_the_sign(tmp_path):
     path, to = table(tmp_path / "a.csv", -5.0), tmp_path / "report"
     done = traction("fit", path, "--to", to, "--negate", "F_n", "--models", "tustin")
     assert done.code == 0, done.err
+
+
+def record_of(*warnings):
+    """An import record with these warnings."""
+    return ImportRecord(
+        log_format="MCAP",
+        robot="gantry",
+        joints=("slide_x",),
+        is_estimated=False,
+        files=(),
+        topics=(),
+        arguments={},
+        checks=(),
+        trials={"T01": (3.0, 11.0)},
+        warnings=warnings,
+        losses=(),
+        versions={},
+    )
+
+
+@pytest.mark.parametrize(
+    ("warnings", "words"),
+    [
+        (("the moments are mirrored", "a lag"), "its import: 2, see Imported in the"),
+        ((), ""),
+    ],
+)
+def test_warnings_of_an_import_are_repeated_before_the_fit(
+    tmp_path, monkeypatch, capsys, warnings, words
+):
+    path = table(tmp_path / "a.csv", 5.0)
+    (tmp_path / RECORD).write_text(record_of(*warnings).text())
+    monkeypatch.setattr(external_tables, "run_study", stopped)
+    with pytest.raises(SettingsError, match="stopped before the fit"):
+        external_tables.report_tables_of_trials(
+            [path],
+            tmp_path / "report",
+            load_tables([path]),
+            {},
+            ReportRequest(1),
+            Console(color=False),
+        )
+    out = capsys.readouterr().out
+    assert words in out
+    assert ("warnings of its import" in out) is bool(warnings)
+    assert all(first in out for first in warnings[:1])
+
+
+def stopped(*_, **__):
+    raise SettingsError("stopped before the fit")
