@@ -16,6 +16,7 @@ from analysis.data.series import Array, TractionSeries
 from analysis.logs.clocks import lag_by_receipts
 from analysis.logs.estimates import (
     LONGEST_LAG,
+    STEADY,
     SURE,
     Bools,
     Estimate,
@@ -38,7 +39,6 @@ from analysis.logs.signs import (
 from ft_sensor.payload import Payload
 from wam.model.constants import GRAVITY
 
-FREE_FORCE = 0.5  # N, limit of the force of a free foot and of the drift of a tare
 LARGEST_MASS_ERROR = 0.02  # kg
 LARGEST_TILT = 1.0  # degrees of the normal; at 2 degrees F_t/F_n is wrong by 0.035
 _ON_GROUND = 0.001  # m above its lowest position below which a foot is not free
@@ -115,6 +115,17 @@ class AppliedImport:
         return rows
 
     @property
+    def largest_free_force(self) -> float:
+        """Largest force of the free foot [N]: the error of F_t/F_n is that of the tilt.
+
+        At least as much as the force of a quiet foot may change.
+        """
+        load = np.linalg.norm(self.force[self.in_trials], axis=1)
+        load = load[load > PRESSED_FORCE]  # False for NaN
+        usual = float(np.median(load)) if load.size else 0.0
+        return max(STEADY, usual * math.tan(math.radians(LARGEST_TILT)))
+
+    @property
     def height(self) -> Array:
         """Position of the foot along the normal [m], shape (n,)."""
         return self.record.path.foot @ self.axes[2]
@@ -166,10 +177,11 @@ def tare_check(judged: AppliedImport, quiet: Bools) -> Check:
     mean = float(np.linalg.norm(rest.mean(axis=0)))
     spread = (float(np.mean(rest.std(axis=0))),)
     how = f"force of the free foot in {np.count_nonzero(quiet)} quiet rows; noise"
+    limit = judged.largest_free_force
     warning = (
-        f"the free foot reads {mean:.1f} N (limit {FREE_FORCE:g}): a forgotten tare or "
+        f"the free foot reads {mean:.2f} N (limit {limit:.2f}): a forgotten tare or "
         "weight? Check --tare and --tool-mass"
-        if mean > FREE_FORCE
+        if mean > limit
         else ""
     )
     return Check("tare", stated, "N", (mean,), spread, how, warning)
@@ -320,10 +332,11 @@ def tare_warnings(judged: AppliedImport, request: ImportRequest) -> list[str]:
     raw = judged.raw[rows, :3]
     half = len(raw) // 2
     drift = float(np.linalg.norm(raw[:half].mean(axis=0) - raw[half:].mean(axis=0)))
-    if half and drift > FREE_FORCE:
+    limit = judged.largest_free_force
+    if half and drift > limit:
         warnings.append(
-            f"the halves of the window of --tare differ by {drift:.1f} N (limit "
-            f"{FREE_FORCE:g})"
+            f"the halves of the window of --tare differ by {drift:.2f} N (limit "
+            f"{limit:.2f})"
         )
     return warnings
 

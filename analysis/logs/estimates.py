@@ -26,7 +26,7 @@ Bools = NDArray[np.bool_]
 LIFTED = 0.010  # m above the lowest position of the foot
 SHORTEST_REST = 0.5  # s
 _QUIET = 4.0  # limit of the change of a 50 ms mean as a multiple of the noise
-_STEADY = 0.1  # N, least limit: the noise of a filtered sensor is not white
+STEADY = 0.1  # N, least limit: the noise of a filtered sensor is not white
 _MEAN = 0.05  # s
 # weight
 SMALLEST_TURN = 20.0  # degrees between orientations, unloaded
@@ -97,7 +97,7 @@ def _is_quiet(force: Array, width: int) -> Bools:
         mean = np.convolve(filled[:, axis], kernel, "same")
         ahead, behind = np.roll(mean, -width), np.roll(mean, width)
         change = np.abs(ahead - behind)
-        is_quiet &= change <= max(_QUIET * float(sd), _STEADY)
+        is_quiet &= change <= max(_QUIET * float(sd), STEADY)
     is_quiet[:width] = is_quiet[-width:] = False
     return is_quiet
 

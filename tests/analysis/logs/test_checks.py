@@ -1,11 +1,18 @@
 """Checks of stated values against the paths and forces of made trials."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from analysis.logs.checks import LARGEST_TILT, AppliedImport, normal_check
+from analysis.logs.checks import (
+    LARGEST_TILT,
+    AppliedImport,
+    normal_check,
+    tare_check,
+)
+from analysis.logs.estimates import STEADY
 from ft_sensor.payload import Payload
 
 ROWS = 200  # of a trial
@@ -45,3 +52,19 @@ def test_the_trial_whose_ground_has_another_slope_is_named():
     warning = normal_check(strokes(0.0, 5.0)).warning
     assert "T02: --normal is 5.0 degrees off" in warning
     assert "T01" not in warning
+
+
+@pytest.mark.parametrize("load", [3.0, 10.0, 500.0])
+@pytest.mark.parametrize("share", [0.8, 1.2])
+def test_a_tare_may_err_as_much_as_a_tilt_at_the_limit(load, share):
+    """Whatever the load: both change F_t/F_n by the same amount."""
+    judged = strokes(0.0)
+    pressed = np.tile([0.0, 0.0, load], (ROWS, 1))
+    limit = max(STEADY, load * np.tan(np.radians(LARGEST_TILT)))
+    free = np.tile([share * limit, 0.0, 0.0], (ROWS, 1))
+    judged = replace(judged, force=pressed)
+    assert judged.largest_free_force == pytest.approx(limit)
+    with_free = replace(judged, force=np.vstack([pressed, free]))
+    with_free = replace(with_free, values=np.zeros((2 * ROWS, 3)))
+    quiet = np.repeat([False, True], ROWS)
+    assert bool(tare_check(with_free, quiet).warning) is (share > 1.0)
