@@ -53,6 +53,7 @@ SLOWEST_RATE, USUAL_RATE = 50.0, 100.0  # Hz
 LARGEST_LAG = 10.0  # s
 _UPRIGHT = 0.1  # smallest share of a direction that lies in the ground plane
 _FEWEST_ROWS = 3
+_ROUNDED = 0.05  # s; the extent is printed with one decimal
 
 
 @dataclass(frozen=True, slots=True)
@@ -276,6 +277,16 @@ def _extent(t: Array, losses: Sequence[str]) -> str:
     return "; ".join([f"The log goes from 0 to {t[-1]:.1f} s", *losses]) + "."
 
 
+def _require_within(
+    option: str, span: tuple[float, float], t: Array, extent: str
+) -> None:
+    """Refuse a span of time [s of the log] that the joints do not cover."""
+    if span[0] < -_ROUNDED or span[1] > t[-1] + _ROUNDED:
+        raise SettingsError(
+            f"{option} {span[0]:g}:{span[1]:g} is not within the log.", hint=extent
+        )
+
+
 def _payload(
     request: ImportRequest, record: LegRecord, raw: Array, extent: str
 ) -> Payload:
@@ -289,6 +300,7 @@ def _payload(
     elif isinstance(tare, np.ndarray):
         bias = tare
     else:
+        _require_within("--tare", tare, record.t, extent)
         rows = rows_within(record.t, raw, tare)
         if np.count_nonzero(rows) < _FEWEST_ROWS:
             raise SettingsError(
@@ -306,6 +318,7 @@ def _trial_rows(request: ImportRequest, t: Array, extent: str) -> list[tuple[int
     """Return (first, end) rows of every trial; raises SettingsError."""
     spans: list[tuple[int, int]] = []
     for begin, end in request.trials:
+        _require_within("--trials", (begin, end), t, extent)
         rows = int(np.searchsorted(t, begin)), int(np.searchsorted(t, end, "right"))
         if rows[1] - rows[0] < _FEWEST_ROWS:
             raise SettingsError(

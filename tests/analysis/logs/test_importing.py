@@ -224,9 +224,13 @@ def test_another_frame_in_the_header_is_reported(imported):
         ({"wrench": "/joint_states"}, "is a sensor_msgs/JointState"),
         ({"joints": "/ft/wrench"}, "is a geometry_msgs/WrenchStamped"),
         ({"lag": 20.0}, "--lag 20000 ms is beyond 10000 ms"),
-        ({"tare": (50.0, 60.0)}, "holds 0 readings"),
+        ({"tare": (50.0, 60.0)}, "--tare 50:60 is not within the log"),
+        ({"tare": (-1.0, 0.6)}, "--tare -1:0.6 is not within the log"),
         ({"trials": [(0.0, 1.5)]}, "In 0 rows of the trials the force is over 2 N"),
-        ({"trials": [(50.0, 51.0)]}, "--trials 50:51 holds 0 rows"),
+        ({"trials": [(50.0, 51.0)]}, "--trials 50:51 is not within the log"),
+        ({"trials": [(3.0, 12.1)]}, "--trials 3:12.1 is not within the log"),
+        ({"trials": [(3.0, 3.001)]}, "--trials 3:3.001 holds 1 rows"),
+        ({"tare": (0.1, 0.101)}, "--tare 0.1:0.101 holds 1 readings"),
         ({"along": np.array([0, 0, 1.0])}, "are the same direction"),
         ({"foot": "fut"}, "nearest links are foot"),
     ],
@@ -245,7 +249,7 @@ def test_a_span_beyond_a_cut_log_is_refused_with_the_cut(written, tmp_path, opti
     data = whole.read_bytes()
     cut, urdf = tmp_path / "cut.mcap", write_urdf(tmp_path)
     cut.write_bytes(data[: int(0.8 * len(data))])
-    with pytest.raises(SettingsError, match="holds 0") as error:
+    with pytest.raises(SettingsError, match="is not within") as error:
         import_log(import_request(StrokeLog(), cut, urdf, **options))
     assert "The log goes from 0 to 6." in error.value.hint
     assert "nothing is read after byte" in error.value.hint

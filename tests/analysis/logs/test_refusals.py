@@ -36,6 +36,8 @@ ESTABLISHED_BY = {
         "--lag {} ms is beyond {} ms.": "the number stated",
         "--tare {}:{} holds {} readings.": "rows with a reading between both times",
         "--trials {}:{} holds {} rows.": "rows between both times",
+        "{} {}:{} is not within the log.": "a time before the first row or after the "
+        "last",
         "{} has {} Hz, the least is {} Hz.": "the median step of its times",
     },
     "leg_record": {
