@@ -185,7 +185,8 @@ def _unit(name: str, value: float, unit: str, looks: str) -> Doubt:
         "unit",
         f"{name} of {value:.3g} {unit}",
         f"these look like {looks}",
-        f"--unit {name}={looks}",
+        f"--unit {name}={looks} if its table states none, else correct the table or "
+        "its import",
     )
 
 

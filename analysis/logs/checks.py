@@ -44,6 +44,10 @@ LARGEST_TILT = 1.0  # degrees of the normal; at 2 degrees F_t/F_n is wrong by 0.
 _ON_GROUND = 0.001  # m above its lowest position below which a foot is not free
 _LEAST_TURN = 2.0  # degrees of turn under load above which a mass of 0 is reported
 _MASS_STEP = 0.1  # kg, unit of mass in that warning
+_REMEDIES = {
+    "lag": "check --lag",
+    "unit": "the URDF is in m, positions in rad or m, forces in N: correct what is not",
+}
 _OPTIONS = "check --sensor, --acts, --tare, --along, --normal and the URDF"
 
 
@@ -382,6 +386,6 @@ def series_warnings(series: TractionSeries) -> list[str]:
     """Check velocity and forces of a trial for plausibility."""
     warnings: list[str] = []
     for doubt in doubts_of(prepare_trial(series, PrepareOptions())):
-        remedy = "check --lag" if doubt.name == "lag" else _OPTIONS
+        remedy = _REMEDIES.get(doubt.name, _OPTIONS)
         warnings.append(f"{series.name}: {replace(doubt, remedy=remedy).text}")
     return warnings

@@ -30,6 +30,7 @@ MOST_LINKS = 500
 _DEEPEST = 64  # nesting depth of elements
 _MOST_ELEMENTS = 100_000
 _FARTHEST = 1_000.0  # m between two joints
+_LONGEST_LEG = 20.0  # m of links between the first moving joint and the foot
 _LONGEST_NAME = 200
 _MOVING = ("revolute", "prismatic", "continuous")
 _FIXED = "fixed"
@@ -275,6 +276,20 @@ def _check_use(path: Path, joint: UrdfJoint) -> None:
         raise _refused(path, f"joint {joint.name} has no axis")
 
 
+def _check_length(path: Path, to_foot: Sequence[UrdfJoint]) -> None:
+    """Refuse lengths in another unit; the place of the robot is none of its links."""
+    first = next(k for k, joint in enumerate(to_foot) if joint.kind in _MOVING)
+    length = sum(math.hypot(*joint.xyz) for joint in to_foot[first + 1 :])
+    if length > _LONGEST_LEG:
+        raise _refused(
+            path,
+            f"the links between joint {to_foot[first].name} and the foot are "
+            f"{length:.4g} m long, the limit is {_LONGEST_LEG:g} m",
+            "Lengths of a URDF are in metres. If these are in millimetres, multiply "
+            "every xyz by 0.001.",
+        )
+
+
 _OTHER_JOINTS = (
     "Fixed, revolute, continuous and prismatic joints may lie between the base and the "
     "foot: each has one position in a JointState."
@@ -320,6 +335,7 @@ class RobotLeg:
         used = {joint.child: joint for joint in (*to_foot, *to_sensor)}
         if not any(joint.kind in _MOVING for joint in to_foot):
             raise _refused(urdf.path, f"no joint moves between the base and {foot!r}")
+        _check_length(urdf.path, to_foot)
         self.base = to_foot[0].parent
         self._model = pin.buildModelFromXML(_plain_urdf(self.base, used.values()))
         self._data = self._model.createData()

@@ -248,7 +248,8 @@ def factor(name: str, stated: str, asked: str) -> float:
     if stated and asked and asked not in {stated, _MASSES.get(stated)}:
         raise SettingsError(
             f"{name} is in {stated} by the table's header and in {asked} by --unit.",
-            hint="Leave --unit out, or correct the header.",
+            hint="Leave --unit out, or correct the header; a package is exported or "
+            "imported again.",
         )
     unit = stated or asked
     if asked and asked == _MASSES.get(stated):

@@ -5,6 +5,8 @@ import pytest
 
 from acquisition.errors import SettingsError
 from analysis.data.prepare import moving_average
+from analysis.data.series import TractionSeries
+from analysis.logs.checks import series_warnings
 from analysis.logs.importing import import_log
 from tests.analysis.logs.gantry import StrokeLog, import_request, write_bag2, write_urdf
 
@@ -253,3 +255,15 @@ def test_a_span_beyond_a_cut_log_is_refused_with_the_cut(written, tmp_path, opti
         import_log(import_request(StrokeLog(), cut, urdf, **options))
     assert "The log goes from 0 to 6." in error.value.hint
     assert "nothing is read after byte" in error.value.hint
+
+
+def test_implausible_speeds_name_what_an_import_can_correct():
+    """A unit of v_t is no option of an import, and its package states metres."""
+    t = np.arange(0.0, 8.0, 0.002)
+    series = TractionSeries(
+        "S0", "T01", t, 60.0 + 0.0 * t, 10.0 + 0.0 * t, 6.0 + 0.0 * t
+    )
+    (warning,) = series_warnings(series)
+    assert "T01: v_t of 60 m/s" in warning
+    assert "--unit" not in warning
+    assert "the URDF is in m" in warning

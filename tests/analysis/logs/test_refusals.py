@@ -101,6 +101,8 @@ ESTABLISHED_BY = {
         "no joint moves between the base and {}": "every joint on the way is fixed",
         "no link {} for the {}.": "no link has that name",
         "over {} elements": "the count",
+        "the links between joint {} and the foot are {} m long, the limit is {} "
+        "m": "the sum of the lengths of their xyz",
         "{} links without a parent, not one: {}": "links that are no child",
         "{}, 1 to {} links can be used": "the counts of links and joints",
         "{}.": "the sentence of the caller",

@@ -148,3 +148,22 @@ def test_a_continuous_joint_turns_without_limit():
     assert path.foot[1] == pytest.approx(path.foot[0], abs=1e-9)
     expected = [-np.sin(0.3), np.cos(0.3), 0]
     assert path.velocity == pytest.approx(np.array([expected] * 2), abs=1e-9)
+
+
+@pytest.mark.parametrize("unit", ["m", "mm"])
+def test_a_urdf_in_millimetres_is_refused_wherever_its_robot_stands(unit):
+    leg = 0.2 if unit == "m" else 200.0
+    data = chain(
+        ("world", "fixed", "a", "b", '<origin xyz="500 0 0"/>'),
+        ("hip", "revolute", "b", "c", f'<origin xyz="{leg} 0 0"/>'),
+        ("sole", "fixed", "c", "d", f'<origin xyz="0 0 {-leg}"/>'),
+        links="abcd",
+    )
+    if unit == "m":
+        assert RobotLeg(parse_urdf(NOWHERE, data), "d", "d").joints == ["hip"]
+        return
+    with pytest.raises(
+        SettingsError, match="joint hip and the foot are 200 m"
+    ) as error:
+        RobotLeg(parse_urdf(NOWHERE, data), "d", "d")
+    assert "multiply every xyz by 0.001" in error.value.hint
