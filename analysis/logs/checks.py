@@ -25,6 +25,7 @@ from analysis.logs.estimates import (
     find_mass,
     find_normal,
     find_quiet,
+    find_sole,
     turn_deg,
 )
 from analysis.logs.leg_record import LegRecord, rows_within
@@ -41,6 +42,8 @@ from wam.model.constants import GRAVITY
 
 LARGEST_MASS_ERROR = 0.02  # kg
 LARGEST_TILT = 1.0  # degrees of the normal; at 2 degrees F_t/F_n is wrong by 0.035
+LARGEST_ABOVE = 0.010  # m between the origin of the foot and where the moments act
+_UP = np.array([0.0, 0.0, 1.0])
 _ON_GROUND = 0.001  # m above its lowest position below which a foot is not free
 _LEAST_TURN = 2.0  # degrees of turn under load above which a mass of 0 is reported
 _MASS_STEP = 0.1  # kg, unit of mass in that warning
@@ -85,7 +88,7 @@ class Check:
 
 
 def _numbers(values: Sequence[float]) -> str:
-    return ", ".join("not known" if math.isnan(x) else f"{x:.4g}" for x in values)
+    return ", ".join("not known" if math.isnan(x) else f"{x:z.4g}" for x in values)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +148,7 @@ def checks_of(judged: AppliedImport, request: ImportRequest) -> list[Check]:
         clock_check(judged.record),
         normal_check(judged),
         direction_check(judged),
+        sole_check(judged),
     ]
 
 
@@ -290,6 +294,30 @@ def direction_check(judged: AppliedImport) -> Check:
     foot = judged.record.path.foot
     estimate = find_direction(foot, judged.spans, judged.axes[2])
     return _check("direction", tuple(judged.axes[0].tolist()), "", estimate)
+
+
+def sole_check(judged: AppliedImport) -> Check:
+    """Check that the origin of the foot lies where the moments act."""
+    sensor, lever = judged.record.path.sensor, judged.record.path.lever
+    wrench = judged.payload.contact(judged.raw, sensor)
+    pressed = judged.in_trials & (judged.values[:, 2] > PRESSED_FORCE)
+    force, moment = wrench[pressed, :3], wrench[pressed, 3:]
+    moment = moment - np.cross(lever[pressed], force)
+    normal = np.mean(judged.axes[2] @ sensor[pressed], axis=0) if len(force) else _UP
+    estimate = find_sole(force, moment, normal)
+    turned, warning = turn_deg(sensor[pressed]) if len(force) else 0.0, ""
+    if estimate.value and turned > _LEAST_TURN:
+        (above,), (spread,) = estimate.value, estimate.spread
+        if abs(above) > LARGEST_ABOVE * 1e3 + spread:
+            side = "below" if above < 0.0 else "above"
+            warning = (
+                f"the moments act {abs(above):.0f} mm {side} the origin of --foot "
+                f"(limit {LARGEST_ABOVE * 1e3:g} and {spread:.0f} of the estimate), "
+                f"and it turns by {turned:.0f} degrees in the trials: v_t is wrong by "
+                "this distance times the rate of the turn, unless the sole is wide and "
+                "its centre of pressure moves with the friction"
+            )
+    return _check("sole", (0.0,), "mm", estimate, warning)
 
 
 def _check(

@@ -42,6 +42,9 @@ SURE = 0.005  # s, lower limit of the uncertainty, because the maximum is flat
 # ground
 SHORTEST_PATH = 0.1  # m of path in the plane
 _WIDE = 0.02  # m of width of the path from which a plane can be fitted
+# sole
+_ALIKE = 1e4  # condition number of the forces beyond which they are parallel
+_UNSURE = 0.02  # m
 _SPAN = 3.5  # width of a uniform distribution in standard deviations
 
 
@@ -300,6 +303,42 @@ def find_normal(foot: Array) -> Estimate:
     angle = float(np.degrees(np.arctan2(_SPAN * misfit, extents[1 if is_plane else 0])))
     how += f", misfit {misfit * 1e3:.2f} mm; +- degrees"
     return Estimate(tuple(normal.tolist()), (angle,), how)
+
+
+def find_sole(force: Array, moment: Array, normal: Array) -> Estimate:
+    """Estimate where along the normal the force acts [mm], 0 = at the foot's origin.
+
+    moment = d x force + c, with d and c fitted: friction that starts and stops turns
+    the force, and its lines of action meet at a sole that is a point. A centre of
+    pressure that moves with the friction shifts the estimate; one that moves otherwise
+    widens its spread.
+
+    Args:
+        force: force of the ground, in axes fixed to the foot [N], shape (n, 3).
+        moment: moment about the foot's origin, same axes [N m], shape (n, 3).
+        normal: normal of the ground, same axes, shape (3,).
+    """
+    if len(force) < 3:
+        return nothing("the foot is never pressed")
+    x, y, z = (force - force.mean(axis=0)).T
+    zero = np.zeros(len(force))
+    # the matrix of d -> d x force at every row, shape (n, 3, 3)
+    cross = np.array([[zero, z, -y], [-z, zero, x], [y, -x, zero]]).transpose(2, 0, 1)
+    rest = moment - moment.mean(axis=0)
+    power = np.einsum("nij,nik->jk", cross, cross) / len(force)
+    if np.linalg.cond(power) > _ALIKE:
+        return nothing("the force keeps its direction")
+    at = np.linalg.solve(power, np.einsum("nij,ni->j", cross, rest) / len(force))
+    misfit = float(np.mean((rest - np.einsum("nij,j->ni", cross, at)) ** 2))
+    # of single rows: those of a log are not independent
+    spread = float(np.sqrt(misfit * (normal @ np.linalg.solve(power, normal))))
+    if spread > _UNSURE:
+        return nothing(
+            f"the moments place it within {spread * 1e3:.0f} mm only, "
+            f"{_UNSURE * 1e3:.0f} mm are needed"
+        )
+    how = "moments of a force that turns, if the sole is a point; +- mm"
+    return Estimate((float(at @ normal) * 1e3,), (spread * 1e3,), how)
 
 
 def find_direction(

@@ -267,3 +267,21 @@ def test_implausible_speeds_name_what_an_import_can_correct():
     assert "T01: v_t of 60 m/s" in warning
     assert "--unit" not in warning
     assert "the URDF is in m" in warning
+
+
+@pytest.mark.parametrize(
+    ("foot", "tilt", "shown", "is_reported"),
+    [
+        ("foot", 0.05, 0.0, False),
+        ("gauge", 0.05, -20.0, True),
+        ("gauge", 0.0, -20.0, False),  # no turn, no error of v_t
+    ],
+)
+def test_a_foot_frame_above_the_sole_is_shown_by_the_moments(
+    imported, foot, tilt, shown, is_reported
+):
+    """Also of a foot that tilts by 3 degrees, too little for its path to show."""
+    found = imported(StrokeLog(tilt=tilt), foot=foot)
+    sole = check(found, "sole")
+    assert sole.shown == pytest.approx([shown], abs=3.0)
+    assert ("20 mm below the origin of --foot" in sole.warning) is is_reported
