@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         required=True,
         type=Path,
         metavar="DIR",
-        help="folder of the report",
+        help="folder of the report, empty or new",
     )
     add_table_options(parser)
     parser.add_argument(

@@ -30,8 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--to",
         type=Path,
         metavar="DIR",
-        help="folder of the report and of stored results, e.g. if the data are "
-        "read-only (that of the session, or DATA/study)",
+        help="folder of the report and of stored results: new, empty or of an earlier "
+        "report, e.g. if the data are read-only (that of the session, or DATA/study)",
     )
     add_scheduler_option(parser)
     add_covariate_option(

@@ -30,10 +30,9 @@ from experiments.export.trial_tables import (
     INDEX,
     TableWriter,
     column_rows,
-    make_empty,
 )
 from experiments.operator.console import WARNING, Console
-from experiments.session.data_files import write_new
+from experiments.session.data_files import make_empty, write_new
 
 _Read = Callable[[ImportedTrial], Values]
 # Quantities of own recordings: unit, frame, meaning, digits.

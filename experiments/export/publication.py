@@ -32,11 +32,11 @@ from experiments.export.credits import (
     licence_text,
     readme_text,
 )
-from experiments.export.trial_tables import export_sessions, make_empty
+from experiments.export.trial_tables import export_sessions
 from experiments.operator.console import WARNING, Console
 from experiments.report.choices import ReportRequest
 from experiments.report.sessions import report_sessions
-from experiments.session.data_files import reading, write_new
+from experiments.session.data_files import make_empty, reading, write_new
 from experiments.session.derivation import derive
 from experiments.session.reducer import replay
 from experiments.session.store import SessionFolder, iso_utc

@@ -17,9 +17,8 @@ from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.views import VIEW_TOPICS, encode_views
 from analysis.data.load import sensor_height_of
 from experiments.export.checksums import SUMS, digest_of, write_sums
-from experiments.export.trial_tables import make_empty
 from experiments.operator.console import WARNING, Console
-from experiments.session.data_files import write_new
+from experiments.session.data_files import make_empty, write_new
 from experiments.session.store import SessionFolder
 from ft_sensor.calibration.files import payload_from_toml
 

@@ -9,9 +9,8 @@ from acquisition.files import read_regular
 from analysis.terrains.database import LARGEST, load
 from analysis.terrains.export.exported import TerrainExport
 from analysis.terrains.export.folder import require_target, target_files
-from experiments.export.trial_tables import make_empty
 from experiments.operator.console import WARNING, Console
-from experiments.session.data_files import write_new
+from experiments.session.data_files import make_empty, write_new
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.clock import SystemClock
-from acquisition.errors import SessionError, TrialFileError
+from acquisition.errors import SessionError
 from acquisition.formats import FORMAT
 from analysis.data.load import RecordedTrial, load_trial
 from analysis.data.prepare import PrepareOptions, prepare_trial
@@ -30,7 +30,7 @@ from experiments.export.table_columns import (
     csv_of_rows,
 )
 from experiments.operator.console import WARNING, Console
-from experiments.session.data_files import write_new
+from experiments.session.data_files import make_empty, write_new
 from experiments.session.store import SessionFolder, iso_utc
 
 DICTIONARY, INDEX = "data_dictionary.csv", "trials.csv"
@@ -280,22 +280,3 @@ def column_rows(table: str, quantities: Sequence[Quantity[Any]]) -> list[list[st
         about = [q.unit, q.frame, q.kind, *(steps if is_number else ["", ""])]
         rows += [[table, name, *about, q.meaning] for name in q.names]
     return rows
-
-
-def make_empty(folder: Path) -> None:
-    """Create a folder, or accept an empty one.
-
-    Raises:
-        SessionError: the folder is not empty.
-        TrialFileError: the folder cannot be created.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        is_empty = not any(folder.iterdir())
-    except OSError as error:
-        raise TrialFileError(folder, f"cannot be made ({error.strerror})") from error
-    if not is_empty:
-        raise SessionError(
-            f"{folder} is not empty.",
-            hint="Name a new folder; nothing is ever overwritten.",
-        )

@@ -19,6 +19,7 @@ from experiments.report.study_report import (
     report_study,
     require_folder,
 )
+from experiments.session.data_files import make_empty
 
 Trials = Mapping[str, Sequence[TractionSeries]]
 _TENSION = 0.5  # share of negative rows above which F_n has the wrong sign
@@ -43,6 +44,7 @@ def report_tables_of_trials(
         console: output of progress and warnings.
 
     Raises:
+        SessionError: `out` is not empty.
         SettingsError: a choice does not suit tables, simulated and recorded trials are
             mixed, a trial is duplicate, or no sample is left to fit.
     """
@@ -52,6 +54,7 @@ def report_tables_of_trials(
     _refuse_repeated(trials)
     _refuse_tension(trials)
     require_folder(out)
+    make_empty(out)
     imports = _import_records(files)
     notes = [*_import_notes(imports), *notes_of_tables(trials)]
     for note in notes:  # before the work: a wrong unit shows here

@@ -31,6 +31,7 @@ from experiments.report.truth_errors import (
     compare_with_truth,
     truth_tables,
 )
+from experiments.session.data_files import make_empty
 from experiments.session.store import FOLDS, SessionFolder
 
 _SHARE_OF_DISK = 4  # results may take one part in so many of the free space
@@ -155,12 +156,15 @@ def report_sessions(
     to `data`/study.
 
     Raises:
-        SessionError: no session has a kept trial.
+        SessionError: no session has a kept trial, or the folder of `request` holds
+            something else than an earlier report.
         SettingsError: the folder cannot be written.
         MissingLibraryError: the extra `report` is not installed.
     """
     out = folder_of(sessions, data, request)
     require_folder(out)
+    if request.out is not None and not (out / FOLDS).is_dir():
+        make_empty(out)  # it is no earlier report
     kept = request.out or data  # folder of the results, for the next report
     analysed = study_sessions(sessions, kept, request, console, request.fit)
     reported = _reported(sessions, request, analysed)

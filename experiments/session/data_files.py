@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, cast
 
-from acquisition.errors import TrialFileError
+from acquisition.errors import SessionError, TrialFileError
 from acquisition.files import (
     UnfitFileError,
     create_file,
@@ -85,6 +85,25 @@ def write_new(path: Path, content: bytes) -> None:
         create_file(folder, path.name, content)
         with removed_at_error(folder, path.name):
             os.fsync(folder)
+
+
+def make_empty(folder: Path) -> None:
+    """Create the folder that a user names for output, or accept an empty one.
+
+    Raises:
+        SessionError: the folder is not empty.
+        TrialFileError: the folder cannot be created.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        is_empty = not any(folder.iterdir())
+    except OSError as error:
+        raise TrialFileError(folder, f"cannot be made ({error.strerror})") from error
+    if not is_empty:
+        raise SessionError(
+            f"{folder} is not empty.",
+            hint="Name a new folder; nothing is ever overwritten.",
+        )
 
 
 def move_file(source: Path, target: Path) -> None:

@@ -80,3 +80,14 @@ def test_warnings_of_an_import_are_repeated_before_the_fit(
 
 def stopped(*_, **__):
     raise SettingsError("stopped before the fit")
+
+
+def test_a_fit_never_writes_into_a_folder_that_holds_something(tmp_path):
+    path, to = table(tmp_path / "a.csv", 5.0), tmp_path / "out"
+    to.mkdir()
+    (to / "fits.json").write_text("of another fit")
+    done = traction("fit", path, "--to", to, "--models", "tustin")
+    assert done.code == 2
+    assert "is not empty" in done.err
+    assert "fitting" not in done.out
+    assert (to / "fits.json").read_text() == "of another fit"

@@ -26,6 +26,22 @@ def test_a_report_elsewhere_leaves_the_data_unchanged(recorded, tmp_path):
     assert (tmp_path / "out" / "report" / "index.html").is_file()
     assert (tmp_path / "out" / ".folds").is_dir()
     assert content(recorded.data) == before
+    again = ("--to", tmp_path / "out", *TUSTIN)
+    done = traction("report", "S001", "--data", recorded.data, *again)
+    assert "The report is up to date" in done.out
+    (tmp_path / "out" / "fits.json").unlink()
+    done = traction("report", "S001", "--data", recorded.data, *again)
+    assert done.code == 0, done.err
+    assert (tmp_path / "out" / "fits.json").is_file()
+
+
+def test_a_report_never_writes_into_a_folder_of_something_else(recorded, tmp_path):
+    (tmp_path / "fits.json").write_text("of a fit")
+    done = traction("report", "S001", "--data", recorded.data, "--to", tmp_path)
+    assert done.code == 2
+    assert "is not empty" in done.err
+    assert "fitting" not in done.out
+    assert content(tmp_path).keys() == {tmp_path / "fits.json"}
 
 
 def test_a_folder_that_cannot_be_created_is_refused_before_any_fit(recorded, tmp_path):
