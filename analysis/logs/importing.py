@@ -129,48 +129,72 @@ def import_log(request: ImportRequest) -> ImportedLog:
         )
     urdf = read_urdf(request.urdf)
     leg = RobotLeg(urdf, request.foot, request.sensor)
-    axes = _axes(request.along, request.normal)
+    _axes(request.along, request.normal)  # refused before the log is read
     with open_log(request.log) as log:
         record = record_of_leg(log, leg, request.joints, request.wrench, request.clock)
-        warnings = _clock_warnings(record, request)
-        require_no_jump(record.joints)
-        warnings += [
-            *_rate_warnings(record, request),
-            *_channel_warnings(record, request, log),
-        ]
-        raw = record.raw(request.lag)
-        raw[_stuck_rows(record, request)] = np.nan
-        extent = _extent(record.t, log.losses)
-        payload = _payload(request, record, raw, extent)
-        sensor = record.path.sensor
-        force = payload.to_base(payload.contact(raw, sensor), sensor)
-        values = traction(axes, record.path.velocity, force)
-        spans = _trial_rows(request, record.t, extent)
-        judged = AppliedImport(record, spans, axes, payload, raw, force, values)
-        checks = checks_of(judged, request)
-        doubts = [check.warning for check in checks if check.warning]
-        doubts += tare_warnings(judged, request)
-        checks = [*checks, *sign_checks(judged, doubts)]
-        warnings += [*doubts, *warnings_of(judged)]
-        trials = [
-            _trial(f"T{k + 1:02d}", span, judged, request, log.is_simulated)
-            for k, span in enumerate(spans)
-        ]
-        for trial in trials:
-            warnings += series_warnings(trial.series)
-        return ImportedLog(
-            request,
-            log.format,
-            urdf,
-            record.joints,
-            record.wrench,
-            leg.joints,
-            checks,
-            trials,
-            warnings,
-            list(log.losses),
-            log.is_simulated,
-        )
+        return apply_request(request, urdf, leg.joints, log, record)
+
+
+def apply_request(
+    request: ImportRequest,
+    urdf: Urdf,
+    joint_names: Sequence[str],
+    log: LogFile,
+    record: LegRecord,
+) -> ImportedLog:
+    """Apply the user's input to the record of a log, and check it.
+
+    Raises:
+        SettingsError: the record or the input is unusable.
+    """
+    warnings = record_warnings(record, request, log)
+    axes = _axes(request.along, request.normal)
+    raw = record.raw(request.lag)
+    raw[_stuck_rows(record, request)] = np.nan
+    extent = _extent(record.t, log.losses)
+    payload = _payload(request, record, raw, extent)
+    sensor = record.path.sensor
+    force = payload.to_base(payload.contact(raw, sensor), sensor)
+    values = traction(axes, record.path.velocity, force)
+    spans = _trial_rows(request, record.t, extent)
+    judged = AppliedImport(record, spans, axes, payload, raw, force, values)
+    checks = checks_of(judged, request)
+    doubts = [check.warning for check in checks if check.warning]
+    doubts += tare_warnings(judged, request)
+    checks = [*checks, *sign_checks(judged, doubts)]
+    warnings += [*doubts, *warnings_of(judged)]
+    trials = [
+        _trial(f"T{k + 1:02d}", span, judged, request, log.is_simulated)
+        for k, span in enumerate(spans)
+    ]
+    for trial in trials:
+        warnings += series_warnings(trial.series)
+    return ImportedLog(
+        request,
+        log.format,
+        urdf,
+        record.joints,
+        record.wrench,
+        joint_names,
+        checks,
+        trials,
+        warnings,
+        list(log.losses),
+        log.is_simulated,
+    )
+
+
+def record_warnings(
+    record: LegRecord, request: ImportRequest, log: LogFile
+) -> list[str]:
+    """Check clocks, joints and rates of a record; raises SettingsError."""
+    warnings = _clock_warnings(record, request)
+    require_no_jump(record.joints)
+    return [
+        *warnings,
+        *_rate_warnings(record, request),
+        *_channel_warnings(record, request, log),
+    ]
 
 
 def _axes(along: Array, normal: Array) -> Array:

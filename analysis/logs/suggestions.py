@@ -17,11 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.errors import SettingsError
+from analysis.data.plausibility import HEADING
 from analysis.data.prepare import moving_average
 from analysis.data.series import Array
 from analysis.logs.channels import By
+from analysis.logs.checks import LARGEST_MASS_ERROR, LARGEST_TILT
 from analysis.logs.clocks import lag_by_receipts
 from analysis.logs.estimates import (
+    LONGEST_LAG,
     Bools,
     Estimate,
     find_direction,
@@ -32,10 +35,13 @@ from analysis.logs.estimates import (
     pressed_stretches,
     runs,
 )
+from analysis.logs.importing import apply_request, record_warnings
 from analysis.logs.leg_record import LegRecord, record_of_leg
+from analysis.logs.log_file import LogFile
 from analysis.logs.messages import STAMPED, MessageError, read_header
 from analysis.logs.motion import rows_averaged
 from analysis.logs.opening import open_log
+from analysis.logs.request import ImportRequest
 from analysis.logs.robot import RobotLeg, Urdf, read_urdf
 from analysis.logs.signs import PRESSED_FORCE
 from ft_sensor.payload import Payload, traction
@@ -46,6 +52,14 @@ _JOIN = 0.3  # s; a shorter lift does not end a stroke
 _LEAST_TRAVEL = 0.02  # m forward needed for a stroke to be a trial
 _INSIDE = 0.05  # s cut from both ends of a quiet span
 _UP = np.array([0.0, 0.0, 1.0])
+_STATED = ("tare", "normal", "along", "lag", "trials")  # beside the mass
+# Uncertainty of an estimate beyond which it is marked, and its unit.
+_LARGEST_SPREADS = {
+    "tool-mass": (LARGEST_MASS_ERROR, "kg"),
+    "normal": (LARGEST_TILT, "degree"),
+    "along": (HEADING, "degrees"),
+    "lag": (LONGEST_LAG * 1e3, "ms"),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,15 +104,23 @@ def listing(request: ListRequest) -> Iterator[str]:
         yield "State --urdf, --foot, --sensor and --acts to see what the log shows."
         yield from _command(request, {})
         return
+    leg = RobotLeg(urdf, str(request.foot), str(request.sensor))
     try:
-        shown = dict(_shown(request, urdf))
+        with open_log(request.log) as log:
+            clock = request.clock or "stamp"
+            record = record_of_leg(log, leg, request.joints, request.wrench, clock)
+            shown = dict(_shown(request, record))
+            doubts = _doubts(request, urdf, leg, log, record, shown)
     except SettingsError as error:
         yield f"▲ no values: {error.message} {error.hint}"
         yield from _command(request, {})
         return
     for option, (_, estimate) in shown.items():
         spread = ", ".join(f"{x:.4g}" for x in estimate.spread)
-        yield f"  --{option}: {estimate.how}{': ' if spread else ''}{spread}"
+        line = f"--{option}: {estimate.how}{': ' if spread else ''}{spread}"
+        doubt = _doubt_of_estimate(option, estimate)
+        yield f"▲ {line}: {doubt}" if doubt else f"  {line}"
+    yield from (f"▲ {doubt}" for doubt in doubts)
     yield from _command(request, {option: text for option, (text, _) in shown.items()})
 
 
@@ -133,15 +155,65 @@ def _command(request: ListRequest, shown: dict[str, str]) -> Iterator[str]:
     yield lines[-1]
 
 
+def _doubt_of_estimate(option: str, estimate: Estimate) -> str:
+    """Return why an estimate should not be stated as it is; "" = it may be."""
+    if option == "trials" and not estimate.value:
+        return "no trial, check --acts, --sensor and --foot"
+    if not estimate.value or option not in _LARGEST_SPREADS:
+        return ""
+    largest, unit = _LARGEST_SPREADS[option]
+    if option == "lag" and abs(estimate.value[0]) > LONGEST_LAG * 1e3:
+        return f"over {LONGEST_LAG * 1e3:g} ms, more than the filter of a sensor"
+    if option == "tool-mass" and estimate.value[0] < 0.0:
+        return "negative, check --acts and --sensor"
+    if estimate.spread and option != "lag" and estimate.spread[0] > largest:
+        return f"less certain than {largest:g} {unit}"
+    return ""
+
+
+def _doubts(
+    request: ListRequest,
+    urdf: Urdf,
+    leg: RobotLeg,
+    log: LogFile,
+    record: LegRecord,
+    shown: dict[str, tuple[str, Estimate]],
+) -> list[str]:
+    """Return the warnings or the refusal of an import with the values shown."""
+    values = {option: estimate.value for option, (_, estimate) in shown.items()}
+    is_complete = all(values.get(option) for option in _STATED)
+    times = values.get("trials", ())
+    mass = values["tool-mass"]
+    try_out = ImportRequest(
+        request.log,
+        urdf.path,
+        str(request.foot),
+        str(request.sensor),
+        "ground-on-foot" if request.acts == "ground-on-foot" else "foot-on-ground",
+        tare=(values["tare"][0], values["tare"][1]) if values["tare"] else "none",
+        mass=mass[0] if mass else 0.0,
+        along=np.array(values["along"] or (1.0, 0.0, 0.0)),
+        normal=np.array(values["normal"] or tuple(_UP)),
+        lag=values["lag"][0] * 1e-3 if values.get("lag") else 0.0,
+        trials=list(zip(times[::2], times[1::2], strict=True)),
+        clock=request.clock,
+        is_slow=True,
+    )
+    try:
+        if is_complete:
+            imported = apply_request(try_out, urdf, leg.joints, log, record)
+            doubts = list(imported.warnings)
+        else:
+            doubts = record_warnings(record, try_out, log)
+    except SettingsError as error:
+        return [f"an import with these values is refused: {error.message} {error.hint}"]
+    return [doubt for doubt in doubts if mass or not doubt.startswith("--tool-mass")]
+
+
 def _shown(
-    request: ListRequest, urdf: Urdf
+    request: ListRequest, record: LegRecord
 ) -> Iterator[tuple[str, tuple[str, Estimate]]]:
     """Yield (option, (value as text, estimate)); raises SettingsError."""
-    leg = RobotLeg(urdf, str(request.foot), str(request.sensor))
-    with open_log(request.log) as log:
-        record = record_of_leg(
-            log, leg, request.joints, request.wrench, request.clock or "stamp"
-        )
     sign = 1.0 if request.acts == "ground-on-foot" else -1.0
     raw, sensor = record.raw(0.0), record.path.sensor
     quiet = find_quiet(record.t, raw, record.path.foot @ _UP)
@@ -174,8 +246,9 @@ def _tare(t: Array, quiet: Bools) -> tuple[str, Estimate]:
         why = "the foot is never quiet 10 mm above its lowest position"
         return "", Estimate((), (), why)
     first, last = max(spans, key=lambda span: span[1] - span[0])
-    text = f"{first + _INSIDE:.2f}:{last - _INSIDE:.2f}"
-    return text, Estimate((first, last), (), "longest quiet span of the lifted foot")
+    first, last = first + _INSIDE, last - _INSIDE
+    how = "longest quiet span of the lifted foot"
+    return f"{first:.2f}:{last:.2f}", Estimate((first, last), (), how)
 
 
 def _payload(
@@ -214,14 +287,15 @@ def _lag(record: LegRecord, values: Array) -> tuple[str, Estimate]:
 
 
 def _trials(record: LegRecord, values: Array) -> tuple[str, Estimate]:
-    spans: list[str] = []
+    spans: list[tuple[float, float]] = []
     strokes = _strokes(record, values[:, 2])
     for first, end in strokes:
         v_t = values[first:end, 0]
         if float(np.clip(v_t, 0.0, None).sum()) * record.motion.step >= _LEAST_TRAVEL:
-            spans.append(f"{record.t[first]:.2f}:{record.t[end - 1]:.2f}")
+            spans.append((float(record.t[first]), float(record.t[end - 1])))
     how = f"{len(spans)} of {len(strokes)} pressed stretches go forward by 20 mm"
-    return ",".join(spans), Estimate((), (), how)
+    text = ",".join(f"{first:.2f}:{last:.2f}" for first, last in spans)
+    return text, Estimate(tuple(t for span in spans for t in span), (), how)
 
 
 def _numbers(values: Sequence[float], digits: int) -> str:
