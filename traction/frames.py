@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from acquisition.errors import MissingLibraryError
+from acquisition.extras import import_refusal
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -28,7 +28,7 @@ def data_frame(
     try:
         import pandas as pd
     except ImportError as error:
-        raise MissingLibraryError("pandas", "pandas") from error
+        raise import_refusal(error, "pandas", "pandas") from error
     frame = pd.DataFrame(dict(columns))
     frame.attrs.update(units=dict(units), **about)
     return frame

@@ -238,8 +238,9 @@ def _unseen_lag(record: LegRecord, stated: float) -> str:
     shown = 0.0 if apart is None else apart * 1e3
     if abs(stated - shown) <= LONGEST_LAG * 1e3:
         return ""
+    clocks = "show no offset" if apart is None else f"are {shown:.0f} ms apart"
     return (
-        f"--lag {stated:.0f} ms: the clocks are {shown:.0f} ms apart, and the motion "
+        f"--lag {stated:.0f} ms: the clocks {clocks}, and the motion "
         f"shows no further lag of up to {LONGEST_LAG * 1e3:.0f} ms"
     )
 

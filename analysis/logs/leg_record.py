@@ -56,15 +56,16 @@ class LegRecord:
         """Return the readings at the times of the joints [N, N m], (n, 6); NaN in gaps.
 
         Raises:
-            SettingsError: joints and wrench do not overlap in time.
+            SettingsError: there is no reading at a time of the joints.
         """
         at, step = self.motion.t + lag, self.motion.step
         raw = mean_around(self.wrench_t, self.wrench.wrench, at, step)
         if not np.isfinite(raw).any():
             first, last = self.wrench_t[[0, -1]] - lag
             raise SettingsError(
-                f"Joints and wrench do not overlap in time: the joints go from 0 to "
-                f"{self.t[-1]:.1f} s, the wrench from {first:.1f} to {last:.1f} s.",
+                "No reading of the wrench lies at a time of the joints: the joints go "
+                f"from 0 to {self.t[-1]:.1f} s, the wrench from {first:.1f} to "
+                f"{last:.1f} s.",
                 hint="State --clock receipt if the clocks differ, or another --lag.",
             )
         return raw

@@ -83,9 +83,9 @@ def moment_warnings(moment: Array, lever: Array, force: Array) -> list[str]:
     if gain >= _MIRRORED:
         return []
     return [
-        f"the moments are {gain:.1f} times those of a force at the foot: two axes of "
-        "the wrench are exchanged, moments have the other sign, or the sole is another "
-        "link. Check --sensor, --foot and the URDF"
+        f"the moments are {gain:.1f} times those of a force at the foot: are two axes "
+        "of the wrench exchanged, have moments the other sign, or is the sole another "
+        "link? Check --sensor, --foot and the URDF"
     ]
 
 

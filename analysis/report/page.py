@@ -10,7 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from acquisition.errors import MissingLibraryError
+from acquisition.extras import import_refusal
 from analysis.report.drawing import cached_figures
 from analysis.report.findings import findings_rows, plain_findings
 from analysis.report.page_model import (
@@ -30,8 +30,8 @@ from analysis.study.study import Study
 
 try:
     from jinja2 import Environment, PackageLoader, StrictUndefined
-except ModuleNotFoundError as error:
-    raise MissingLibraryError("Jinja2", "report") from error
+except ImportError as error:
+    raise import_refusal(error, "jinja2", "report") from error
 
 __all__ = ["ReportContext", "ReportTable", "write_report"]
 

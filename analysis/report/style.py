@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from acquisition.errors import MissingLibraryError
+from acquisition.extras import import_refusal
 from analysis.data.terrain_kinds import BIG, FLAT, SMALL
 from analysis.report.pictures import Picture, png_of_few_colours
 
@@ -105,8 +105,8 @@ def require_matplotlib() -> None:
     backend = os.environ.pop("MPLBACKEND", None)  # an unknown one fails the import
     try:
         import matplotlib.figure
-    except ModuleNotFoundError as error:
-        raise MissingLibraryError("matplotlib", "report") from error
+    except ImportError as error:
+        raise import_refusal(error, "matplotlib", "report") from error
     if backend is not None:
         os.environ["MPLBACKEND"] = backend
         with suppress(ValueError):

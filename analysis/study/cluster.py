@@ -11,7 +11,8 @@ from itertools import islice
 from typing import Any
 from urllib.parse import urlsplit
 
-from acquisition.errors import MissingLibraryError, SettingsError
+from acquisition.errors import SettingsError
+from acquisition.extras import import_refusal
 from analysis.study.worker_processes import Call, WorkerLostError
 
 _PATIENCE = 10.0  # s, timeout for reaching a scheduler
@@ -32,7 +33,7 @@ def run_on_cluster(calls: Iterable[Call], address: str) -> Generator[Any]:
     try:
         from distributed import KilledWorker, as_completed
     except ImportError as error:
-        raise MissingLibraryError("distributed", "cluster") from error
+        raise import_refusal(error, "distributed", "cluster") from error
 
     pending = iter(calls)
     with _client(address) as client:

@@ -78,12 +78,19 @@ def check_order(path: Path, table: TrialTable, rows: Array) -> None:
     row = int(backward[0]) + 1
     where = table.location(int(kept[row]))
     before, now = float(t[row - 1]), float(t[row])
-    if now == before:
-        hint = "The times have too few digits: leave t out and give --rate HZ."
+    shared = int(np.count_nonzero((np.diff(t) == 0.0) & ~is_same))
+    if now == before and shared > kept.size // 2:
+        hint = (
+            f"{shared} of {kept.size} rows have the time of the row before: give the "
+            "times more digits, or leave t out and give --rate HZ."
+        )
     elif backward.size > kept.size // 2:
         hint = "Sort the rows by time; or --negate t where it counts down."
     elif now <= t[0] + abs(before - t[0]) / 2.0:
-        hint = f"A trial seems to begin there: split the file at {where}."
+        hint = (
+            f"The times fall back to their start there: if this is another trial, "
+            f"split the file at {where}."
+        )
     else:
         hint = "Sort the rows by time, each time once."
     raise SettingsError(

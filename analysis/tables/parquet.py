@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from acquisition.errors import MissingLibraryError, SettingsError
+from acquisition.errors import SettingsError
+from acquisition.extras import import_refusal
 from analysis.data.series import Array
 from analysis.tables.columns import (
     PREPARED,
@@ -229,5 +230,5 @@ def _arrow() -> Any:  # noqa: ANN401
         import pyarrow.compute
         import pyarrow.parquet
     except ImportError as error:
-        raise MissingLibraryError("pyarrow", "parquet") from error
+        raise import_refusal(error, "pyarrow", "parquet") from error
     return pyarrow

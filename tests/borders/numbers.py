@@ -258,6 +258,11 @@ NUMBERS: tuple[Border, ...] = (
         text(with_column(0, lambda k, old: f"{float(old):.2f}")),
         "leave t out and give --rate HZ",
     ),
+    refused(
+        "two rows of one time",
+        text(with_column(0, lambda k, old: "0.016" if k == 9 else old)),
+        "Sort the rows by time, each time once",
+    ),
     refused("rows in falling order of time", text(ROWS[::-1]), "--negate t"),
     table("a row that stands there twice", text([*ROWS[:9], ROWS[8], *ROWS[9:]])),
     flagged(

@@ -11,7 +11,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from acquisition.errors import MissingLibraryError
-from acquisition.extras import EXTRAS, require_extra
+from acquisition.extras import EXTRAS, import_refusal, require_extra
 from tests.experiments.program import traction, write_config
 
 ROOT = Path(__file__).parents[2]
@@ -84,6 +84,15 @@ def test_an_extra_whose_library_is_hidden_is_reported(extra, monkeypatch):
     with pytest.raises(MissingLibraryError, match=EXTRAS[extra][hidden]) as refused:
         require_extra(extra)
     assert f"traction[{extra}]" in refused.value.hint
+
+
+@pytest.mark.parametrize("is_hidden", [True, False])
+def test_only_a_library_that_is_not_there_is_called_missing(monkeypatch, is_hidden):
+    if is_hidden:
+        monkeypatch.setitem(sys.modules, "pyarrow", None)
+    refusal = import_refusal(ImportError("built for NumPy 1"), "pyarrow", "parquet")
+    assert isinstance(refusal, MissingLibraryError) is is_hidden
+    assert ("built for NumPy 1" in refusal.message) is not is_hidden
 
 
 @pytest.mark.parametrize(

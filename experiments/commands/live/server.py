@@ -8,7 +8,8 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from acquisition.errors import MissingLibraryError, SettingsError
+from acquisition.errors import SettingsError
+from acquisition.extras import import_refusal
 from acquisition.schema import schema_text
 
 if TYPE_CHECKING:
@@ -118,7 +119,7 @@ class LiveServer:
             import foxglove
             from foxglove.websocket import Capability
         except ImportError as error:
-            raise MissingLibraryError("foxglove-sdk", "live") from error
+            raise import_refusal(error, "foxglove", "live") from error
         foxglove.set_log_level("CRITICAL")  # suppress messages on closed clients
         self._context = context = foxglove.Context()  # its end closes the channels
         capabilities = [Capability.Time]

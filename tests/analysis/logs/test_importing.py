@@ -285,3 +285,10 @@ def test_a_foot_frame_above_the_sole_is_shown_by_the_moments(
     sole = check(found, "sole")
     assert sole.shown == pytest.approx([shown], abs=3.0)
     assert ("20 mm below the origin of --foot" in sole.warning) is is_reported
+
+
+def test_a_lag_is_not_compared_with_clocks_that_are_unknown(imported):
+    """Without stamps there is no offset to state."""
+    found = imported(StrokeLog(stamps=False), clock="receipt", lag=0.4)
+    warning = check(found, "lag").warning
+    assert "--lag 400 ms: the clocks show no offset" in warning

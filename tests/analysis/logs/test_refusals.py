@@ -43,8 +43,9 @@ ESTABLISHED_BY = {
     "leg_record": {
         "this is a trial of Traction: report, fit and export read it.": "a topic of "
         "traction_msgs/Cycle",
-        "Joints and wrench do not overlap in time: the joints go from 0 to {} s, the "
-        "wrench from {} to {} s.": "no row of the joints has a reading; both spans",
+        "No reading of the wrench lies at a time of the joints: the joints go from 0 "
+        "to {} s, the wrench from {} to {} s.": "no row of the joints has a reading; "
+        "both spans",
     },
     "log_file": {
         "cannot be copied ({})": "what the system says",
