@@ -53,6 +53,7 @@ SLOWEST_RATE, USUAL_RATE = 50.0, 100.0  # Hz
 LARGEST_LAG = 10.0  # s
 _UPRIGHT = 0.1  # smallest share of a direction that lies in the ground plane
 _FEWEST_ROWS = 3
+_MOST_MISSING = 0.01  # largest share of rows without a reading that is not reported
 _ROUNDED = 0.05  # s; the extent is printed with one decimal
 
 
@@ -150,6 +151,7 @@ def apply_request(
     warnings = record_warnings(record, request, log)
     axes = _axes(request.along, request.normal)
     raw = record.raw(request.lag)
+    is_missing: Bools = np.array(np.isnan(raw).any(axis=1))
     raw[_stuck_rows(record, request)] = np.nan
     extent = _extent(record.t, log.losses)
     payload = _payload(request, record, raw, extent)
@@ -157,6 +159,7 @@ def apply_request(
     force = payload.to_base(payload.contact(raw, sensor), sensor)
     values = traction(axes, record.path.velocity, force)
     spans = _trial_rows(request, record.t, extent)
+    warnings += _missing_warnings(record.t, is_missing, spans)
     judged = AppliedImport(record, spans, axes, payload, raw, force, values)
     checks = checks_of(judged, request)
     doubts = [check.warning for check in checks if check.warning]
@@ -351,6 +354,21 @@ def _trial_rows(request: ImportRequest, t: Array, extent: str) -> list[tuple[int
             )
         spans.append(rows)
     return spans
+
+
+def _missing_warnings(
+    t: Array, is_missing: Bools, spans: Sequence[tuple[int, int]]
+) -> list[str]:
+    """Warn of trials of which the wrench covers only a part."""
+    warnings: list[str] = []
+    for number, (first, end) in enumerate(spans, 1):
+        rows = np.flatnonzero(is_missing[first:end])
+        if len(rows) > _MOST_MISSING * (end - first):
+            warnings.append(
+                f"T{number:02d}: {len(rows)} of {end - first} rows have no reading of "
+                f"the wrench and are dropped, the first at {t[first + rows[0]]:.2f} s"
+            )
+    return warnings
 
 
 def _trial(

@@ -292,3 +292,21 @@ def test_a_lag_is_not_compared_with_clocks_that_are_unknown(imported):
     found = imported(StrokeLog(stamps=False), clock="receipt", lag=0.4)
     warning = check(found, "lag").warning
     assert "--lag 400 ms: the clocks show no offset" in warning
+
+
+@pytest.mark.parametrize(("until", "rows"), [(8.0, 1500), (20.0, 0)])
+def test_a_wrench_that_ends_in_a_trial_is_reported(imported, until, rows):
+    def cut(messages):
+        end = messages[0][1] + until * 1e9
+        return [row for row in messages if row[0] != "/ft/wrench" or row[1] < end]
+
+    found = imported(StrokeLog(changes=(cut,)))
+    missing = [text for text in found.warnings if "no reading of the wrench" in text]
+    if not rows:
+        assert missing == []
+        return
+    (text,) = missing
+    assert "of 4000 rows" in text
+    count = int(text.removeprefix("T01: ").partition(" ")[0])
+    assert count == pytest.approx(rows, abs=20)
+    assert "the first at 7.9" in text or "the first at 8.0" in text
