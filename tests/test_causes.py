@@ -1,7 +1,7 @@
 """Every message that states a cause has evidence and a test that shows the cause.
 
 A refusal states what was observed; its hint asks about possible causes. The messages
-listed here state the cause itself. Those of imported logs are listed in
+listed here state the cause itself. All refusals of imported logs are listed in
 tests/analysis/logs/test_refusals.py, those of the guard in the fault matrix.
 """
 
@@ -94,6 +94,106 @@ CAUSES = {
     ("analysis/tables/other_formats.py", "this is an Excel workbook"): (
         "its first bytes, or [Content_Types].xml in its archive",
         "borders/test_borders.py::test_a_foreign_input_is_read_exactly_flagged_or_refused",
+    ),
+    ("analysis/logs/opening.py", "the recording is duplicated"): (
+        "count of messages and checksum of receipts and bytes are equal in two files",
+        "analysis/logs/test_channels.py::test_a_duplicated_recording_is_reported",
+    ),
+    ("analysis/logs/sqlite_log.py", "shows a transaction that has not ended"): (
+        "the first byte of the journal beside it is not zero",
+        "analysis/logs/test_channels.py::test_a_hot_journal_is_refused_by_its_name",
+    ),
+    ("analysis/logs/bag_log.py", "the file is cut there"): (
+        "it ends before the size that a record states",
+        "analysis/logs/test_log_formats.py::test_a_truncated_log_is_read_to_its_end",
+    ),
+    ("analysis/logs/robot.py", "m long, the limit is"): (
+        "the sum of the lengths between the first joint and the foot",
+        "analysis/logs/test_robot.py::test_a_urdf_in_millimetres_is_refused_wherever_its_robot_stands",
+    ),
+    ("analysis/logs/robot.py", "it holds xacro:"): (
+        "an element in the namespace of xacro",
+        "analysis/logs/test_robot.py::test_a_hostile_urdf_is_refused",
+    ),
+    ("analysis/logs/clocks.py", "two clocks: by the receipts"): (
+        "offsets of both lines through receipt less stamp",
+        "analysis/logs/test_clocks.py::test_offset_clocks_are_refused_with_both_remedies",
+    ),
+    ("analysis/logs/clocks.py", "ms over the log (limit"): (
+        "slope of the line with its 95 % interval",
+        "analysis/logs/test_clocks.py::test_a_sensor_clock_that_runs_fast_is_reported_with_its_drift",
+    ),
+    ("analysis/logs/clocks.py", "after its first message (limit"): (
+        "a lasting step of the fastest messages",
+        "analysis/logs/test_clocks.py::test_a_clock_set_during_the_log_is_refused",
+    ),
+    ("analysis/logs/signs.py", "have the opposite sign"): (
+        "shares of rows with F_n < 0 and with F_t along the motion",
+        "analysis/logs/test_importing.py::test_forces_of_the_opposite_sign_are_refused_with_the_remedy",
+    ),
+    ("analysis/logs/signs.py", "These forces cannot come from the ground"): (
+        "shares of rows of both signs",
+        "analysis/logs/test_importing.py::test_forces_of_the_opposite_sign_are_refused_with_the_remedy",
+    ),
+    ("analysis/logs/channels.py", "unlike those before and after them"): (
+        "exact zeros over 20 mrad from both neighbours",
+        "analysis/logs/test_channels.py::test_joint_states_of_zeros_are_reported_and_omitted",
+    ),
+    ("analysis/logs/importing.py", "unchanged reading for"): (
+        "six equal numbers for 0.2 s and 20 usual readings",
+        "analysis/logs/test_channels.py::test_a_constant_channel_is_omitted_and_reported",
+    ),
+    ("analysis/logs/importing.py", "rows have no reading of the wrench"): (
+        "rows of the trial without a message near",
+        "analysis/logs/test_importing.py::test_a_wrench_that_ends_in_a_trial_is_reported",
+    ),
+    ("analysis/logs/checks.py", "v_t is wrong by this distance"): (
+        "the fit of moments to a force that turns, and the turn of the foot",
+        "analysis/logs/test_importing.py::test_a_foot_frame_above_the_sole_is_shown_by_the_moments",
+    ),
+    ("analysis/logs/checks.py", "show no offset"): (
+        "a topic has no line of receipt less stamp",
+        "analysis/logs/test_importing.py::test_a_lag_is_not_compared_with_clocks_that_are_unknown",
+    ),
+    ("analysis/tables/checks.py", "rows have the time of the row before"): (
+        "the count of equal times, over half of the rows",
+        "borders/test_borders.py::test_a_foreign_input_is_read_exactly_flagged_or_refused",
+    ),
+    ("analysis/tables/checks.py", "The times fall back to their start"): (
+        "the time is in the first half of the step from the first row",
+        "borders/test_borders.py::test_a_foreign_input_is_read_exactly_flagged_or_refused",
+    ),
+    ("analysis/tables/text.py", "this is not UTF-8 text"): (
+        "a zero byte, with its line",
+        "borders/test_borders.py::test_a_foreign_input_is_read_exactly_flagged_or_refused",
+    ),
+    ("analysis/tables/text.py", "the names of the columns are in line"): (
+        "a later line that holds every name",
+        "borders/test_borders.py::test_a_foreign_input_is_read_exactly_flagged_or_refused",
+    ),
+    ("analysis/tables/loading.py", "Save all tables with one unit of it"): (
+        "the units in the headers of two files",
+        "analysis/tables/test_further_inputs.py::test_a_further_column_of_two_units_is_refused",
+    ),
+    ("experiments/report/external_tables.py", "F_n is negative in"): (
+        "the share of negative rows",
+        "experiments/report/test_external_tables.py::test_a_negative_normal_force_is_refused_with_the_option",
+    ),
+    ("acquisition/errors.py", "which is not installed"): (
+        "no such module is found",
+        "experiments/test_extras.py::test_only_a_library_that_is_not_there_is_called_missing",
+    ),
+    ("acquisition/extras.py", "is installed and cannot be imported"): (
+        "the module is found and its import raises",
+        "experiments/test_extras.py::test_only_a_library_that_is_not_there_is_called_missing",
+    ),
+    ("analysis/study/worker_processes.py", "ended unexpectedly"): (
+        "signal or exit code of the process",
+        "analysis/study/test_tasks.py::test_a_worker_that_dies_is_reported_with_its_signal_and_replaced",
+    ),
+    ("experiments/report/study_report.py", "cannot be written"): (
+        "what the system says of the folder",
+        "experiments/report/test_report_elsewhere.py::test_a_folder_that_cannot_be_created_is_refused_before_any_fit",
     ),
     ("acquisition/ipc/layout.py", "runs another version of this program"): (
         "size and digest of the layout in the other process's memory",

@@ -157,3 +157,25 @@ def test_recorder_times_are_free_of_delay_and_drift():
     true = stamps[0] + np.rint((stamps - stamps[0]) / 1.001).astype(np.int64)
     assert np.abs(found - true).max() < 1e6
     assert replace(fit, sure=(-1.0, 1.0)).is_drifting is False
+
+
+def test_messages_of_one_stamp_are_refused(imported):
+    def same_stamp(messages):
+        for _, _, message in messages:
+            message.header.stamp.sec = 1
+            message.header.stamp.nanosec = 0
+        return messages
+
+    words = "5999 of 6000 messages of /joint_states have the stamp of another one"
+    with pytest.raises(SettingsError, match=words):
+        imported(StrokeLog(changes=(same_stamp,)))
+
+
+def test_messages_of_one_receipt_have_no_time_of_receipt(imported):
+    def same_receipt(messages):
+        return [(topic, messages[0][1], message) for topic, _, message in messages]
+
+    with pytest.raises(
+        SettingsError, match="was received at 1 times for 6000 messages"
+    ):
+        imported(StrokeLog(changes=(same_receipt,)), clock="receipt")

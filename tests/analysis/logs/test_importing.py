@@ -234,6 +234,7 @@ def test_another_frame_in_the_header_is_reported(imported):
         ({"trials": [(3.0, 3.001)]}, "--trials 3:3.001 holds 1 rows"),
         ({"tare": (0.1, 0.101)}, "--tare 0.1:0.101 holds 1 readings"),
         ({"along": np.array([0, 0, 1.0])}, "are the same direction"),
+        ({"along": np.array([0.5, 0.8, 0])}, "The force across the path is"),
         ({"foot": "fut"}, "nearest links are foot"),
     ],
 )

@@ -9,6 +9,7 @@ from mcap.writer import Writer
 
 from acquisition.errors import SettingsError
 from acquisition.trial_file.unpacking import DamageError, Unpacker
+from analysis.logs.channels import read_channels
 from analysis.logs.log_file import LARGEST_PART, LARGEST_RATIO
 from analysis.logs.opening import open_log
 from tests.analysis.logs.gantry import StrokeLog, write_bag, write_bag2
@@ -111,6 +112,7 @@ def test_a_file_that_is_not_a_log_is_refused(tmp_path):
     for name, data, why in (
         ("a.csv", b"t,v_t\n1,2\n", "not a known log format"),
         ("a.parquet", b"PAR1" + bytes(20), "not a known log format"),
+        ("a.bag", b"#ROSBAG V1.2\n" + bytes(20), "a bag of format 1"),
         ("a.db3", b"SQLite format 3\0" + bytes(200), "cannot be read as a database"),
         ("a.mcap.zstd", zstandard.compress(bytes(9_000_000)), "unpacks to over"),
     ):
@@ -120,6 +122,37 @@ def test_a_file_that_is_not_a_log_is_refused(tmp_path):
             pass
     with pytest.raises(SettingsError, match="no logs in this folder"):
         read(tmp_path / "..")
+
+
+def test_a_message_that_is_text_ends_a_database(logs, tmp_path):
+    (file,) = logs["db3"].glob("*.db3")
+    path = tmp_path / file.name
+    path.write_bytes(file.read_bytes())
+    with sqlite3.connect(path) as database:
+        database.execute("UPDATE messages SET data = 'words' WHERE id = 10")
+    database.close()
+    _, found, losses = read(path)
+    assert len(found) == 9
+    assert losses == ["nothing is read after a message: a message is not bytes"]
+
+
+def test_a_message_of_another_layout_is_refused_with_its_number(tmp_path):
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        for kind, topic in (
+            ("sensor_msgs/msg/JointState", "/joint_states"),
+            ("geometry_msgs/msg/WrenchStamped", WRENCH),
+        ):
+            schema = writer.register_schema(kind, "ros2msg", b"")
+            channel = writer.register_channel(topic, "cdr", schema)
+            writer.add_message(channel, 1, b"\0\1\0\0" + bytes(8), 1)
+        writer.finish()
+    with open_log(path) as log:
+        topics = log.topics
+        with pytest.raises(SettingsError, match="message 1 of /joint_states does not"):
+            read_channels(log, topics["/joint_states"], ["j"], topics[WRENCH], None)
 
 
 def test_a_view_instead_of_a_table_is_not_read(tmp_path):

@@ -72,6 +72,7 @@ def test_urdf_kinematics_agree_with_the_arm_model():
             "xyz is '1 nan 0'",
         ),
         (chain(links=[f"l{k}" for k in range(501)]), "501 links"),
+        (chain(links=["a", ""]), "a link has no usable name"),
     ],
 )
 def test_a_hostile_urdf_is_refused(data, why):
@@ -148,6 +149,12 @@ def test_a_continuous_joint_turns_without_limit():
     assert path.foot[1] == pytest.approx(path.foot[0], abs=1e-9)
     expected = [-np.sin(0.3), np.cos(0.3), 0]
     assert path.velocity == pytest.approx(np.array([expected] * 2), abs=1e-9)
+
+
+def test_a_foot_that_no_joint_moves_is_refused():
+    robot = parse_urdf(NOWHERE, chain(("j", "fixed", "a", "b", ""), links="ab"))
+    with pytest.raises(SettingsError, match="no joint moves between the base and 'b'"):
+        RobotLeg(robot, "b", "b")
 
 
 @pytest.mark.parametrize("unit", ["m", "mm"])

@@ -91,3 +91,11 @@ def test_a_fit_never_writes_into_a_folder_that_holds_something(tmp_path):
     assert "is not empty" in done.err
     assert "fitting" not in done.out
     assert (to / "fits.json").read_text() == "of another fit"
+
+
+def test_a_trial_that_is_given_twice_is_refused(tmp_path):
+    paths = [table(tmp_path / name, 5.0) for name in ("a.csv", "b.csv")]
+    done = traction("fit", *paths, "--to", tmp_path / "out", "--models", "tustin")
+    assert done.code == 2
+    assert "holds the same trial as" in done.err
+    assert not (tmp_path / "out").exists()
