@@ -185,8 +185,6 @@ def _parsed(path: Path, data: bytes) -> ET.Element:
         parser.close()
     except (ET.ParseError, ValueError, LookupError) as error:
         raise _refused(path, f"it is not XML ({error})") from error
-    if root is None:
-        raise _refused(path, "it has no element")
     for element in root.iter():
         space, _, name = element.tag.rpartition("}")
         if "xacro" in space:

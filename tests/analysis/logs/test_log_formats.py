@@ -1,6 +1,7 @@
 """Logs of another library are read whole, damaged and packed ones within bounds."""
 
 import sqlite3
+import struct
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from mcap.writer import Writer
 
 from acquisition.errors import SettingsError
 from acquisition.trial_file.unpacking import DamageError, Unpacker
+from analysis.logs import bag_log, mcap_log
 from analysis.logs.channels import read_channels
 from analysis.logs.log_file import LARGEST_PART, LARGEST_RATIO
 from analysis.logs.opening import open_log
@@ -122,6 +124,34 @@ def test_a_file_that_is_not_a_log_is_refused(tmp_path):
             pass
     with pytest.raises(SettingsError, match="no logs in this folder"):
         read(tmp_path / "..")
+
+
+@pytest.mark.parametrize(
+    ("name", "module", "words"),
+    [
+        ("bag", bag_log, "over 1 topics"),
+        ("mcap", mcap_log, "over 1 types"),
+    ],
+)
+def test_a_log_of_too_many_topics_is_refused(logs, monkeypatch, name, module, words):
+    monkeypatch.setattr(module, "MOST_TOPICS", 1)
+    with pytest.raises(SettingsError, match=words):
+        read(logs[name])
+
+
+@pytest.mark.parametrize(
+    ("header", "why"),
+    [
+        (struct.pack("<I", 99) + b"op=\2", "a field exceeds its header"),
+        (struct.pack("<I", 2) + b"op", "a header has an invalid field"),
+    ],
+)
+def test_a_damaged_header_of_a_bag_ends_it(tmp_path, header, why):
+    path = tmp_path / "a.bag"
+    path.write_bytes(bag_log.MAGIC + struct.pack("<I", len(header)) + header)
+    _, found, losses = read(path)
+    assert found == []
+    assert losses == [f"nothing is read after byte {len(bag_log.MAGIC)}: {why}"]
 
 
 def test_a_message_that_is_text_ends_a_database(logs, tmp_path):

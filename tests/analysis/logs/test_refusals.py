@@ -85,7 +85,6 @@ ESTABLISHED_BY = {
         "byte {} is not {}": "the first byte that the encoding cannot say",
         "cannot be read ({})": "what the system says",
         "elements over {} deep": "the depth",
-        "it has no element": "the parser ends without one",
         "it holds <!DOCTYPE or <!ENTITY": "the bytes of either",
         "it holds xacro:{}": "an element in the namespace of xacro; a comment is none",
         "it is not XML ({})": "what the parser says, with line and column",
