@@ -81,7 +81,7 @@ def test_a_recording_without_sensor_readings_fails():
     assert cause(**nothing).startswith("swing of the foot's weight")
 
 
-@pytest.mark.parametrize("stiffness", [9.5, 15.0, 29.0])
+@pytest.mark.parametrize("stiffness", [9.5, 15.0, 33.0])
 def test_a_lock_of_another_stiffness_is_reported(stiffness):
     assert cause(**turned(stiffness)).startswith("stiffness of joint 7's lock")
 
