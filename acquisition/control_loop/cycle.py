@@ -107,7 +107,7 @@ class Cycle:
         self._known = 0  # number of the newest verdict when it was requested
         self._is_starting = False
         self._move: tuple[Vector, float] | None = None
-        self._proof: PoweredTestGoal | None = None
+        self._powered_test: PoweredTestGoal | None = None
         self._silent_until_ns = 0
         self._reported: GuardVerdict | None = None
         self.is_recording = False
@@ -153,7 +153,7 @@ class Cycle:
         self._requested = event
         self._known = self.status.number
         self._move = None
-        self._proof = None
+        self._powered_test = None
         self._silent_until_ns = 0
 
     def move_to(self, goal: Sequence[float], speed: float) -> None:
@@ -164,9 +164,9 @@ class Cycle:
         """
         self._move = np.array(goal), speed
 
-    def prove(self, goal: PoweredTestGoal) -> None:
-        """Request a proof, like `move_to`. Any verdict ends it in idle."""
-        self._proof = goal
+    def start_powered_test(self, goal: PoweredTestGoal) -> None:
+        """Request a powered test, like `move_to`. Any verdict ends it in idle."""
+        self._powered_test = goal
 
     def set_bias(self, bias: Sequence[float]) -> None:
         """Set the sensor's reading without load [N, N m], six numbers."""
@@ -245,19 +245,19 @@ class Cycle:
             self._is_starting = False
 
     def _begin_move(self, reading: ArmReading) -> None:
-        """Begin the requested move or proof unless a verdict is active."""
+        """Begin the requested move or powered test unless a verdict is active."""
         if reading.missing_cycles:
             return
         move, self._move = self._move, None
-        proof, self._proof = self._proof, None
+        goal, self._powered_test = self._powered_test, None
         if self.status.verdict is not None:
             return
         try:
             if move is not None:
                 self.law.move_to(*move, reading)
-            elif proof is not None:
-                self.law.prove(proof, reading)
-                self._silent_until_ns = reading.host_ns + proof.silence_ns
+            elif goal is not None:
+                self.law.start_powered_test(goal, reading)
+                self._silent_until_ns = reading.host_ns + goal.silence_ns
                 # The arm lies on its stops: disarm the position limits.
                 self._guard = replace(self._guard, armed=0)
         except ValueError:
@@ -316,14 +316,16 @@ class Cycle:
         )
         self._guard, verdict = check(self.limits, self._guard, seen)
         if self.law.is_testing():
-            verdict = self._judge_proof(reading, verdict)
+            verdict = self._judge_powered_test(reading, verdict)
         reported, self._reported = self._reported, None
         if reported is not None and reported.severity > verdict.severity:
             return reported
         return verdict
 
-    def _judge_proof(self, reading: ArmReading, verdict: GuardVerdict) -> GuardVerdict:
-        """Return the guard's verdict in a proof, or else that of the proof's limits."""
+    def _judge_powered_test(
+        self, reading: ArmReading, verdict: GuardVerdict
+    ) -> GuardVerdict:
+        """Return the guard's verdict in a powered test, else that of its limits."""
         is_powered = self.status.safety is SafetyMode.ACTIVE
         is_silent = reading.host_ns < self._silent_until_ns
         if is_silent and verdict.fault is Fault.CAN_SILENCE:

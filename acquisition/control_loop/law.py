@@ -31,8 +31,8 @@ class ControlLaw(Protocol):
         """
         ...
 
-    def prove(self, goal: PoweredTestGoal, reading: ArmReading) -> None:
-        """Start the proof `goal` in hold; its torques replace the control law.
+    def start_powered_test(self, goal: PoweredTestGoal, reading: ArmReading) -> None:
+        """Start the powered test `goal` in hold; its torques replace the control law.
 
         Raises:
             ValueError: the arm is not in hold, or `goal` is invalid.
@@ -40,13 +40,13 @@ class ControlLaw(Protocol):
         ...
 
     def is_testing(self) -> bool:
-        """Return whether the arm is in a proof: any fault then leads to idle."""
+        """Return whether the arm is in a powered test: any fault then leads to idle."""
         ...
 
     def powered_test_excess(
         self, reading: ArmReading, energy: float, *, is_powered: bool
     ) -> MotionExcess | None:
-        """Return the limit of motion that an arm in a proof exceeds, or None.
+        """Return the limit of motion that a powered test exceeds, or None.
 
         Args:
             reading: reading of this cycle.

@@ -1,4 +1,4 @@
-"""Proofs: powered tests of an unknown arm with small torques and tight limits.
+"""Powered tests of an unknown arm with small torques and tight limits.
 
 The arm lies on its stops and gets zero torque, that of one joint, or a share of gravity
 compensation. It may move only in the pushed direction and within these limits; any
@@ -31,7 +31,7 @@ class PoweredTestKind(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class PoweredTestGoal:
-    """Parameters of one proof.
+    """Parameters of one powered test.
 
     Attributes:
         kind: kind of torque.
@@ -62,7 +62,7 @@ class PoweredTestGoal:
 
     @classmethod
     def of(cls, values: Sequence[float]) -> "PoweredTestGoal":
-        """Return the proof with these `values`."""
+        """Return the goal with these `values`."""
         kind, joint, torque, seconds = values[:4]
         return cls(PoweredTestKind(int(kind)), int(joint), torque, seconds)
 
@@ -72,7 +72,7 @@ PARTNERS = {2: 3, 3: 2, 5: 6, 6: 5}  # joints coupled by a differential
 
 @dataclass(frozen=True, slots=True)
 class PoweredTestLimits:
-    """Limits of the motion in a proof.
+    """Limits of the motion in a powered test.
 
     Attributes:
         rest: travel of each joint without torque [rad], seven.

@@ -73,7 +73,7 @@ class MoveJoints:
 
 @dataclass(frozen=True, slots=True)
 class StartPoweredTest:
-    """Start a proof, in hold."""
+    """Start a powered test, in hold."""
 
     goal: PoweredTestGoal
 

@@ -128,8 +128,8 @@ class LoopClient:
         """
         self._asked = self._commands.post(MoveJoints(tuple(goal), speed))
 
-    def prove(self, goal: PoweredTestGoal) -> None:
-        """Request a proof, in hold."""
+    def start_powered_test(self, goal: PoweredTestGoal) -> None:
+        """Request a powered test, in hold."""
         self._asked = self._commands.post(StartPoweredTest(goal))
 
     def set_bias(self, bias: Sequence[float]) -> None:

@@ -115,7 +115,7 @@ class LoopServer:
             case MoveJoints(goal, speed):
                 cycle.move_to(goal, speed)
             case StartPoweredTest(goal):
-                cycle.prove(goal)
+                cycle.start_powered_test(goal)
             case LeaveLoop():
                 self.is_over = True
         self._status.obeyed = posted.number

@@ -94,7 +94,7 @@ def lay_down(scene: Scene) -> None:
 def _activate(scene: Scene, text: str, *presses: PendantAction) -> None:
     """Have the lying arm activated without torque; raises as `lay_down`."""
     scene.loop_client.start()
-    scene.prove(PoweredTestGoal(PoweredTestKind.REST))
+    scene.start_powered_test(PoweredTestGoal(PoweredTestKind.REST))
     scene.wait(0.1)
     scene.say(f"{text} Keep the hands off the arm: it gets no torque.")
     if scene.simulation is not None:
@@ -133,7 +133,7 @@ def rest_and_silence(scene: Scene) -> Values:
         return values
     scene.show_share(0.8, "nothing is asked for: the module has to brake")
     reader = scene.rig.shared.cycles.reader()
-    scene.prove(
+    scene.start_powered_test(
         PoweredTestGoal(PoweredTestKind.SILENCE, seconds=POWERED_TEST_LIMITS.silence)
     )
     ended: list[str] = []
@@ -367,7 +367,7 @@ def _run_tests(
     ended: list[str] = []
     for number, goal in enumerate(goals):
         scene.show_share(number / len(goals), _words(goal))
-        scene.prove(goal)
+        scene.start_powered_test(goal)
         reader = scene.rig.shared.cycles.reader()
         # A test ends without torque, the arm lying down within its own limits.
         ended = scene.until_fault(lambda: None, seconds + _REST)

@@ -226,9 +226,9 @@ class Scene:
         finally:
             self.console_loop.hand = None
 
-    def prove(self, goal: PoweredTestGoal) -> None:
+    def start_powered_test(self, goal: PoweredTestGoal) -> None:
         """Request a powered test from the loop."""
-        self.loop_client.prove(goal)
+        self.loop_client.start_powered_test(goal)
 
     def position(self) -> Array:
         """Joint positions [rad], shape (7,)."""

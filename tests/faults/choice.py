@@ -28,7 +28,7 @@ WHY: Mapping[Fault, str] = {
     Fault.E_STOP: _CIRCUIT,
     Fault.PENDANT_IDLE: _CIRCUIT,
     Fault.CAN_SILENCE: f"{_POSITIONS}: 50 ms are waited for them",
-    Fault.REPLIES_LATE: f"{_POSITIONS}: 20 ms prove it",
+    Fault.REPLIES_LATE: f"{_POSITIONS}: confirmed within 20 ms",
     Fault.SAFETY_SILENT: "nobody knows whether the arm is driven: 400 ms are waited",
     Fault.POSITION_JUMP: f"{_POSITIONS}: 50 ms are waited for them",
     Fault.MOTOR_STALLED: _TORQUES,

@@ -261,9 +261,9 @@ _LOADED = Cell(
     Arm(30, "driven", HOLD, "holding"),
 )
 _PAST = " answered an earlier request: positions are "
-# One cycle in 47 requests nothing; late positions are then proved within 20 ms.
+# One cycle in 47 requests nothing; late positions are then confirmed within 20 ms.
 _OLD = Arm(120, "idle", ArmState.IDLE, "UNKNOWN, held with old positions")
-_UNPROVED = replace(OK, why="the session ends before a cycle asks for nothing")
+_UNCONFIRMED = replace(OK, why="the session ends before a cycle asks for nothing")
 
 
 def _late() -> Row:
@@ -273,7 +273,7 @@ def _late() -> Row:
         _OLD,
         "replies-late",
         preflight=_refused(" not report a position in time: "),
-        end=_UNPROVED,
+        end=_UNCONFIRMED,
     )
 
 

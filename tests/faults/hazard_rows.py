@@ -80,7 +80,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "an old position is taken for a new one",
             "busy bus, slow adapter",
             "replies that come after their cycle, or twice, are counted. One cycle in 47, and one in 20 at the preflight, asks for none: what comes then is late by whole cycles",
-            "they are thrown away; the next cycle waits for both. Late by whole cycles: hold, and idle when it is proved twice more, within 20 ms; refused at the start",
+            "they are thrown away; the next cycle waits for both. Late by whole cycles: hold, and idle when it is confirmed twice more, within 20 ms; refused at the start",
             (
                 "reply-late",
                 "reply-doubled",

@@ -24,7 +24,7 @@ the value does not exceed the one without a fault.
 """
 _S = StepId
 # Steps of `traction commission` by the signal that they verify on the real arm.
-PROOFS: dict[str, tuple[StepId, ...]] = {
+VERIFYING_STEPS: dict[str, tuple[StepId, ...]] = {
     "joint position": (_S.IDENTITY, _S.TIMING, _S.BY_HAND),
     "joint torque command": (_S.IDENTITY, _S.RAMPS, _S.LIFT, _S.GRAVITY_RAMP),
     "safety mode": (_S.IDENTITY, _S.STOP_CIRCUIT, _S.REST_POSE),
@@ -128,7 +128,7 @@ def hazard_lines() -> list[str]:
     for row in hazards():
         if row.signal != signal:
             signal = row.signal
-            lines += ["", f"## {signal.capitalize()}", "", *_proofs(signal)]
+            lines += ["", f"## {signal.capitalize()}", "", *_verifying_steps(signal)]
             lines += [_TITLES, _RULE]
         tests = "<br>".join(f"`{test}`" for test in row.tests)
         faults = ", ".join(f"`{fault}`" for fault in row.faults)
@@ -139,10 +139,12 @@ def hazard_lines() -> list[str]:
     return [*lines, "", f"{len(hazards())} rows, {blind} of them not detected."]
 
 
-def _proofs(signal: str) -> list[str]:
-    """Return the lines about the steps that prove a signal on the arm."""
-    steps = ", ".join(f"{step} {step.words}" for step in PROOFS.get(signal, ()))
-    return [f"Proved on the arm itself by {steps}.", ""] if steps else []
+def _verifying_steps(signal: str) -> list[str]:
+    """Return the lines about the steps that verify a signal on the arm."""
+    steps = ", ".join(
+        f"{step} {step.words}" for step in VERIFYING_STEPS.get(signal, ())
+    )
+    return [f"Verified on the arm itself by {steps}.", ""] if steps else []
 
 
 _COLUMNS = ("how", "hazard", "cause", "detected by", "reaction", "bound", "test")

@@ -10,7 +10,7 @@ from experiments.commissioning.procedure import STEPS
 from tests.faults.expected import TABLE
 from tests.faults.hazards import (
     OF_THE_COMPUTER,
-    PROOFS,
+    VERIFYING_STEPS,
     Mode,
     hazards,
     measured,
@@ -44,9 +44,9 @@ def functions_of(path):
 
 
 def test_every_arm_signal_is_checked_by_steps_in_use():
-    assert set(PROOFS) | OF_THE_COMPUTER == SIGNALS
-    assert not set(PROOFS) & OF_THE_COMPUTER
-    assert all(set(steps) <= set(STEPS) and steps for steps in PROOFS.values())
+    assert set(VERIFYING_STEPS) | OF_THE_COMPUTER == SIGNALS
+    assert not set(VERIFYING_STEPS) & OF_THE_COMPUTER
+    assert all(set(steps) <= set(STEPS) and steps for steps in VERIFYING_STEPS.values())
 
 
 def test_the_hazard_page_has_every_signal():

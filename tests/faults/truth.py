@@ -102,7 +102,7 @@ LATE = Promise(
     travel=0.1,
     drive=70.0,
     why="the arm holds by positions of three cycles ago until a cycle that asks for "
-    "none shows it, which is one in 47, and for the 20 ms that prove it",
+    "none shows it, which is one in 47, and for the 20 ms that confirm it",
 )
 STUCK = Promise(
     speed=1.75,

@@ -48,7 +48,7 @@ class MoveMode:
         return move_reference(self.path, (now_ns - self.begun_ns) * 1e-9)
 
 
-# In hold an arm may make a move or be in a proof; the other modes are plain states.
+# In hold an arm may move or be in a powered test; the other modes are plain states.
 Mode = ArmState | MoveMode | PoweredTest
 
 
@@ -140,26 +140,26 @@ class FootController(ControlLaw):
         self._watch.begin()
         return path.duration
 
-    def prove(self, goal: PoweredTestGoal, reading: ArmReading) -> None:
-        """Start the proof `goal`: its torques replace the control law; only in hold.
+    def start_powered_test(self, goal: PoweredTestGoal, reading: ArmReading) -> None:
+        """Start the powered test `goal` in hold; its torques replace the control law.
 
         Raises:
             ValueError: the arm is not in hold or moves, or `goal` is invalid.
         """
         if self._mode is not ArmState.HOLD and not self.is_testing():
-            raise ValueError("a proof begins in hold only")
+            raise ValueError("a powered test begins in hold only")
         self._mode = PoweredTest(goal, self._model.constants, reading)
         self._hold.release()
         self._lock.release(reading.host_ns)
 
     def is_testing(self) -> bool:
-        """Return whether the arm is in a proof: any fault then leads to idle."""
+        """Return whether the arm is in a powered test: any fault then leads to idle."""
         return isinstance(self._mode, PoweredTest)
 
     def powered_test_excess(
         self, reading: ArmReading, energy: float, *, is_powered: bool
     ) -> MotionExcess | None:
-        """Return the limit of motion that an arm in a proof exceeds, or None."""
+        """Return the limit of motion that a powered test exceeds, or None."""
         if not isinstance(self._mode, PoweredTest):
             return None
         return self._mode.excess(reading, energy, is_powered=is_powered)

@@ -1,4 +1,4 @@
-"""Torques of a proof (powered test): zero, one joint's, or a share of gravity."""
+"""Torques of a powered test: zero, one joint's, or a share of gravity."""
 
 import numpy as np
 
@@ -39,7 +39,7 @@ class PoweredTest:
         if not (1 if needs_joint else 0) <= goal.joint <= _JOINTS:
             raise ValueError(f"there is no joint {goal.joint}")
         if not (np.isfinite(goal.torque) and 0.0 < goal.seconds <= 60.0):
-            raise ValueError(f"{goal} is not a valid proof")
+            raise ValueError(f"{goal} is not a valid powered test")
         if goal.silence_ns > limits.silence * NS_PER_S:
             raise ValueError(f"{goal} leaves the arm unwatched for too long")
         self.goal = goal

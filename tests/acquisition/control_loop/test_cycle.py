@@ -855,9 +855,9 @@ def test_an_unknown_arm_is_not_polled_until_torques_are_requested(bench):
 
 
 @pytest.fixture
-def proved(bench):
+def held(bench):
     """A held arm whose control law accepts any powered test and does nothing."""
-    bench.law.prove = lambda proof, reading: None
+    bench.law.start_powered_test = lambda goal, reading: None
     bench.law.is_testing = lambda: True
     bench.law.powered_test_excess = lambda reading, energy, is_powered: None
     bench.enter(ArmState.HOLD)
@@ -871,35 +871,35 @@ def silent(bench, cycles):
         bench.run()
 
 
-def test_a_heartbeat_test_sends_no_requests_until_it_ends(proved):
-    proved.cycle.prove(PoweredTestGoal(PoweredTestKind.SILENCE, seconds=0.1))
-    proved.run()
-    asked_ns = proved.arm.asked_ns
-    silent(proved, 49)
-    assert proved.arm.asked_ns == asked_ns
-    assert (proved.reason, proved.state) == ("", ArmState.HOLD)
-    proved.arm.missing = 0
-    proved.run()
-    assert proved.arm.asked_ns > asked_ns
-    silent(proved, LIMITS.idle_after_missing)  # unintended silence
-    assert proved.reason == Fault.CAN_SILENCE
+def test_a_heartbeat_test_sends_no_requests_until_it_ends(held):
+    held.cycle.start_powered_test(PoweredTestGoal(PoweredTestKind.SILENCE, seconds=0.1))
+    held.run()
+    asked_ns = held.arm.asked_ns
+    silent(held, 49)
+    assert held.arm.asked_ns == asked_ns
+    assert (held.reason, held.state) == ("", ArmState.HOLD)
+    held.arm.missing = 0
+    held.run()
+    assert held.arm.asked_ns > asked_ns
+    silent(held, LIMITS.idle_after_missing)  # unintended silence
+    assert held.reason == Fault.CAN_SILENCE
 
 
-def test_an_intended_silence_hides_no_other_fault(proved):
-    proved.cycle.prove(PoweredTestGoal(PoweredTestKind.SILENCE, seconds=0.1))
-    proved.run()
-    silent(proved, 10)
-    proved.arm.mode = SafetyMode.E_STOP
-    silent(proved, 1)
-    assert proved.reason == Fault.E_STOP
+def test_an_intended_silence_hides_no_other_fault(held):
+    held.cycle.start_powered_test(PoweredTestGoal(PoweredTestKind.SILENCE, seconds=0.1))
+    held.run()
+    silent(held, 10)
+    held.arm.mode = SafetyMode.E_STOP
+    silent(held, 1)
+    assert held.reason == Fault.E_STOP
 
 
-def test_a_request_ends_an_intended_silence(proved):
-    proved.cycle.prove(PoweredTestGoal(PoweredTestKind.SILENCE, seconds=0.1))
-    proved.run()
-    asked_ns = proved.arm.asked_ns
-    proved.enter(ArmState.HOLD)
-    assert proved.arm.asked_ns > asked_ns
+def test_a_request_ends_an_intended_silence(held):
+    held.cycle.start_powered_test(PoweredTestGoal(PoweredTestKind.SILENCE, seconds=0.1))
+    held.run()
+    asked_ns = held.arm.asked_ns
+    held.enter(ArmState.HOLD)
+    assert held.arm.asked_ns > asked_ns
 
 
 def test_the_status_before_the_first_cycle_is_idle_without_a_verdict(bench):
@@ -975,7 +975,7 @@ def test_a_fault_of_the_same_severity_does_not_replace_the_first(bench):
     assert bench.reason == "foot-speed"  # it was there all the time
 
 
-class ProvingLaw(Law):
+class PoweredTestLaw(Law):
     """A law in a powered test; keeps whether the motors were reported as powered."""
 
     def __init__(self):
@@ -992,32 +992,32 @@ class ProvingLaw(Law):
 
 
 @pytest.fixture
-def proving():
+def testing():
     bench = Bench()
-    bench.law = ProvingLaw()
+    bench.law = PoweredTestLaw()
     bench.cycle = bench.make()
     bench.enter(ArmState.HOLD)
     return bench
 
 
-def test_a_powered_test_continues_while_the_arm_behaves(proving):
-    proving.run(3)
-    assert (proving.state, proving.reason) == (ArmState.HOLD, "")
-    assert proving.law.powered[-1]
-    proving.arm.mode = SafetyMode.IDLE
-    proving.run()
-    assert not proving.law.powered[-1]
+def test_a_powered_test_continues_while_the_arm_behaves(testing):
+    testing.run(3)
+    assert (testing.state, testing.reason) == (ArmState.HOLD, "")
+    assert testing.law.powered[-1]
+    testing.arm.mode = SafetyMode.IDLE
+    testing.run()
+    assert not testing.law.powered[-1]
 
 
-def test_an_excess_in_a_powered_test_ends_in_idle(proving):
-    proving.law.excess = MotionExcess("the travel of joint 4", 0.03, 0.025, "rad")
-    proving.run()
-    assert (proving.state, proving.reason) == (ArmState.IDLE, Fault.POWERED_TEST_MOTION)
-    assert proving.cycle.status.verdict.detail == proving.law.excess
+def test_an_excess_in_a_powered_test_ends_in_idle(testing):
+    testing.law.excess = MotionExcess("the travel of joint 4", 0.03, 0.025, "rad")
+    testing.run()
+    assert (testing.state, testing.reason) == (ArmState.IDLE, Fault.POWERED_TEST_MOTION)
+    assert testing.cycle.status.verdict.detail == testing.law.excess
 
 
-def test_a_guard_verdict_takes_precedence_and_idles_a_powered_test(proving):
-    proving.law.excess = MotionExcess("the travel of joint 4", 0.03, 0.025, "rad")
-    proving.arm.missing = 5
-    proving.run()
-    assert (proving.state, proving.reason) == (ArmState.IDLE, Fault.CAN_SILENCE)
+def test_a_guard_verdict_takes_precedence_and_idles_a_powered_test(testing):
+    testing.law.excess = MotionExcess("the travel of joint 4", 0.03, 0.025, "rad")
+    testing.arm.missing = 5
+    testing.run()
+    assert (testing.state, testing.reason) == (ArmState.IDLE, Fault.CAN_SILENCE)

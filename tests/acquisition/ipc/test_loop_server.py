@@ -49,7 +49,7 @@ class Cycle:
     def move_to(self, goal, speed):
         self.goals.append((goal, speed))
 
-    def prove(self, goal):
+    def start_powered_test(self, goal):
         self.goals.append(goal)
 
     def set_bias(self, bias):

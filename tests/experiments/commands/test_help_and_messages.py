@@ -312,7 +312,7 @@ def _allow_no(travel):
 def _test_at_rest(scene):
     """Take the torque from an arm that a hand carries, as if it lay on its stops."""
     scene.built.cycle.request(ArmState.HOLD)
-    scene.built.cycle.prove(PoweredTestGoal(PoweredTestKind.REST))
+    scene.built.cycle.start_powered_test(PoweredTestGoal(PoweredTestKind.REST))
 
 
 def _damp_in_vain(scene):

@@ -240,11 +240,11 @@ PUSH = PoweredTestGoal(PoweredTestKind.RAMP, 2, 4.0)
 
 def test_a_powered_test_replaces_gravity_compensation(law):
     law.enter(ArmState.HOLD, reading(0.0))
-    law.prove(PUSH, reading(1.0))
+    law.start_powered_test(PUSH, reading(1.0))
     assert law.is_testing()
     tau, gravity = law.torque(reading(1.5))
     assert tau.tolist() == gravity.tolist() == [0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0]
-    law.prove(
+    law.start_powered_test(
         PoweredTestGoal(PoweredTestKind.REST), reading(2.0)
     )  # one after the other
     assert not law.torque(reading(2.5))[0].any()
@@ -257,24 +257,28 @@ def test_a_powered_test_replaces_gravity_compensation(law):
 @pytest.mark.parametrize("state", [s for s in ArmState if s is not ArmState.HOLD])
 def test_a_powered_test_begins_only_in_hold(law, state):
     law.enter(state, reading(0.0))
-    with pytest.raises(ValueError, match="proof begins in hold only"):
-        law.prove(PUSH, reading(1.0))
+    with pytest.raises(ValueError, match="powered test begins in hold only"):
+        law.start_powered_test(PUSH, reading(1.0))
     assert not law.is_testing()
 
 
 def test_the_heartbeat_test_is_limited_to_the_modules_timeout(law):
     law.enter(ArmState.HOLD, reading(0.0))
     with pytest.raises(ValueError, match="unwatched for too long"):
-        law.prove(PoweredTestGoal(PoweredTestKind.SILENCE, seconds=0.4), reading(1.0))
-    law.prove(PoweredTestGoal(PoweredTestKind.SILENCE, seconds=0.3), reading(1.0))
+        law.start_powered_test(
+            PoweredTestGoal(PoweredTestKind.SILENCE, seconds=0.4), reading(1.0)
+        )
+    law.start_powered_test(
+        PoweredTestGoal(PoweredTestKind.SILENCE, seconds=0.3), reading(1.0)
+    )
     assert not law.torque(reading(1.1))[0].any()
 
 
 def test_no_powered_test_begins_in_a_move(law):
     law.enter(ArmState.HOLD, reading(0.0))
     law.move_to(DOWN, 0.5, reading(1.0))
-    with pytest.raises(ValueError, match="proof begins in hold only"):
-        law.prove(PUSH, reading(1.0))
+    with pytest.raises(ValueError, match="powered test begins in hold only"):
+        law.start_powered_test(PUSH, reading(1.0))
     assert law.is_moving()
 
 
@@ -282,7 +286,7 @@ def test_travel_excess_is_reported_only_in_a_powered_test(law):
     astray = DOWN + 0.05 * np.eye(7)[3]
     law.enter(ArmState.HOLD, reading(0.0))
     assert law.powered_test_excess(reading(0.5, q=astray), 9.0, is_powered=True) is None
-    law.prove(PUSH, reading(1.0))
+    law.start_powered_test(PUSH, reading(1.0))
     assert law.powered_test_excess(reading(1.1), 0.0, is_powered=True) is None
     excess = law.powered_test_excess(reading(1.1, q=astray), 0.0, is_powered=True)
     assert excess.quantity == "the travel of joint 4"

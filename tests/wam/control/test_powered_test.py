@@ -40,8 +40,8 @@ def reading(ms=0, **joints):
     )
 
 
-def excess(proof, now, energy=0.0, *, is_powered=True):
-    return proof.excess(now, energy, is_powered=is_powered)
+def excess(test, now, energy=0.0, *, is_powered=True):
+    return test.excess(now, energy, is_powered=is_powered)
 
 
 LIMITS = POWERED_TEST_LIMITS
@@ -79,18 +79,18 @@ def travel_rows():
 def test_travel_within_its_limit_passes_and_beyond_is_reported(
     goal, joint, sense, limit
 ):
-    proof = PoweredTest(goal, CONSTANTS, reading())
-    assert excess(proof, reading(**{f"j{joint}": 0.99 * sense * limit})) is None
-    found = excess(proof, reading(**{f"j{joint}": 1.01 * sense * limit}))
+    test = PoweredTest(goal, CONSTANTS, reading())
+    assert excess(test, reading(**{f"j{joint}": 0.99 * sense * limit})) is None
+    found = excess(test, reading(**{f"j{joint}": 1.01 * sense * limit}))
     assert f"joint {joint}" in found.quantity
     assert found.value == pytest.approx(1.01 * sense * limit)
     assert found.limit == pytest.approx(sense * limit)
 
 
 def test_kinetic_energy_within_its_limit_passes_and_beyond_is_reported():
-    proof = PoweredTest(REST, CONSTANTS, reading())
-    assert excess(proof, reading(10), 0.99 * LIMITS.energy) is None
-    found = excess(proof, reading(10), 1.01 * LIMITS.energy)
+    test = PoweredTest(REST, CONSTANTS, reading())
+    assert excess(test, reading(10), 0.99 * LIMITS.energy) is None
+    found = excess(test, reading(10), 1.01 * LIMITS.energy)
     assert (found.quantity, found.limit, found.unit) == (
         *("kinetic energy", LIMITS.energy),
         "J",
@@ -100,25 +100,23 @@ def test_kinetic_energy_within_its_limit_passes_and_beyond_is_reported():
 @pytest.mark.parametrize("joint", range(1, 8))
 @pytest.mark.parametrize("sense", [-1.0, 1.0])
 def test_a_ramp_grows_linearly_until_its_joint_has_moved_forward(sense, joint):
-    proof = PoweredTest(
-        pushed(PoweredTestKind.RAMP, joint, sense), CONSTANTS, reading()
-    )
+    test = PoweredTest(pushed(PoweredTestKind.RAMP, joint, sense), CONSTANTS, reading())
     reach = sense * LIMITS.reach[joint - 1]
-    half = proof.torque(reading(500), WEIGHT)
+    half = test.torque(reading(500), WEIGHT)
     assert half == pytest.approx(2.5 * sense * np.eye(7)[joint - 1])
     for short in (0.99, -1.01):
-        assert proof.torque(reading(2000, **{f"j{joint}": short * reach}), WEIGHT).any()
+        assert test.torque(reading(2000, **{f"j{joint}": short * reach}), WEIGHT).any()
     moved = reading(2000, **{f"j{joint}": 1.01 * reach})
-    assert not proof.torque(moved, WEIGHT).any()
-    assert not proof.torque(reading(2000), WEIGHT).any()
-    assert excess(proof, reading(2000), is_powered=False) is None
-    assert proof.torque(reading(3000), WEIGHT).any()
+    assert not test.torque(moved, WEIGHT).any()
+    assert not test.torque(reading(2000), WEIGHT).any()
+    assert excess(test, reading(2000), is_powered=False) is None
+    assert test.torque(reading(3000), WEIGHT).any()
 
 
 @pytest.mark.parametrize("sense", [-1.0, 1.0])
 def test_a_lift_rises_at_its_speed_pauses_and_returns(sense):
     """A lift pulls a joint behind its reference and none on the reference."""
-    proof = PoweredTest(pushed(PoweredTestKind.LIFT, 4, sense), CONSTANTS, reading())
+    test = PoweredTest(pushed(PoweredTestKind.LIFT, 4, sense), CONSTANTS, reading())
     up_s = LIMITS.lift_travel / LIMITS.lift_speed
     pause_s = 0.3
     for seconds, height in (
@@ -127,81 +125,79 @@ def test_a_lift_rises_at_its_speed_pauses_and_returns(sense):
     ):
         travel = sense * height * LIMITS.lift_travel
         there = reading(1000 * seconds, j4=travel)
-        assert proof.torque(there, WEIGHT) == pytest.approx(np.zeros(7), abs=1e-3)
+        assert test.torque(there, WEIGHT) == pytest.approx(np.zeros(7), abs=1e-3)
         behind = reading(1000 * seconds, j4=travel - 1e-3 * sense)
-        pull = proof.torque(behind, WEIGHT)[3]
+        pull = test.torque(behind, WEIGHT)[3]
         assert pull == pytest.approx(sense * 1e-3 * CONSTANTS.kp[3], abs=1e-3)
 
 
 def test_without_power_the_arm_may_be_moved_and_the_ramp_waits():
-    proof = PoweredTest(
+    test = PoweredTest(
         PoweredTestGoal(PoweredTestKind.RAMP, 1, 8.0, 1.0), CONSTANTS, reading()
     )
-    assert excess(proof, reading(900, j4=-0.5), is_powered=False) is None
-    assert excess(proof, reading(902, j4=-0.5)) is None
-    assert proof.torque(reading(1400, j4=-0.5), WEIGHT)[0] == pytest.approx(4.0)
+    assert excess(test, reading(900, j4=-0.5), is_powered=False) is None
+    assert excess(test, reading(902, j4=-0.5)) is None
+    assert test.torque(reading(1400, j4=-0.5), WEIGHT)[0] == pytest.approx(4.0)
 
 
 def test_gravity_torque_is_ramped_to_its_full_value():
     goal = PoweredTestGoal(PoweredTestKind.GRAVITY, seconds=2.0)
-    proof = PoweredTest(goal, CONSTANTS, reading())
-    assert proof.torque(reading(1000), WEIGHT) == pytest.approx(WEIGHT / 2)
-    assert proof.torque(reading(5000), WEIGHT) == pytest.approx(WEIGHT)
+    test = PoweredTest(goal, CONSTANTS, reading())
+    assert test.torque(reading(1000), WEIGHT) == pytest.approx(WEIGHT / 2)
+    assert test.torque(reading(5000), WEIGHT) == pytest.approx(WEIGHT)
 
 
 def test_a_lift_never_exceeds_its_torque_and_ends_at_zero():
-    proof = PoweredTest(
+    test = PoweredTest(
         PoweredTestGoal(PoweredTestKind.LIFT, 4, -6.0), CONSTANTS, reading()
     )
-    assert proof.torque(reading(1600), WEIGHT)[3] == -6.0
+    assert test.torque(reading(1600), WEIGHT)[3] == -6.0
     for ms in (3502, 4000):
-        assert not proof.torque(reading(ms, j4=-0.01), WEIGHT).any()
+        assert not test.torque(reading(ms, j4=-0.01), WEIGHT).any()
 
 
 def test_a_ramp_to_zero_torque_has_zero_torque():
-    proof = PoweredTest(PoweredTestGoal(PoweredTestKind.RAMP, 2), CONSTANTS, reading())
+    test = PoweredTest(PoweredTestGoal(PoweredTestKind.RAMP, 2), CONSTANTS, reading())
     for offset in (-0.02, 0.0, 0.02):
-        assert not proof.torque(reading(500, j2=offset), WEIGHT).any()
+        assert not test.torque(reading(500, j2=offset), WEIGHT).any()
 
 
 def test_a_lift_is_damped_and_clipped_in_both_directions():
-    proof = PoweredTest(
+    test = PoweredTest(
         PoweredTestGoal(PoweredTestKind.LIFT, 4, 5.0), CONSTANTS, reading()
     )
     moving = replace(reading(1700, j4=0.08), qd=0.1 * np.eye(7)[3])
-    damped = proof.torque(moving, WEIGHT)[3]
+    damped = test.torque(moving, WEIGHT)[3]
     assert damped == pytest.approx(-0.1 * CONSTANTS.kd[3], abs=1e-6)
-    assert proof.torque(reading(1700, j4=-0.02), WEIGHT)[3] == 5.0
-    assert proof.torque(reading(1700, j4=0.18), WEIGHT)[3] == -5.0
+    assert test.torque(reading(1700, j4=-0.02), WEIGHT)[3] == 5.0
+    assert test.torque(reading(1700, j4=0.18), WEIGHT)[3] == -5.0
 
 
 @pytest.mark.parametrize(("joint", "other"), PARTNERS.items())
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_the_partner_of_a_lifted_joint_is_held_within_its_limit(side, joint, other):
-    proof = PoweredTest(
+    test = PoweredTest(
         PoweredTestGoal(PoweredTestKind.LIFT, joint, 1.0), CONSTANTS, reading()
     )
     lifted = {f"j{joint}": 0.08}
     limit = 2.0 * CONSTANTS.coulomb[other - 1]
-    far = proof.torque(reading(1700, **lifted, **{f"j{other}": side}), WEIGHT)
+    far = test.torque(reading(1700, **lifted, **{f"j{other}": side}), WEIGHT)
     assert far[other - 1] == pytest.approx(-side * limit)
     near = 0.5 * limit / CONSTANTS.kp[other - 1]
-    kept = proof.torque(reading(1700, **lifted, **{f"j{other}": side * near}), WEIGHT)
+    kept = test.torque(reading(1700, **lifted, **{f"j{other}": side * near}), WEIGHT)
     assert kept[other - 1] == pytest.approx(-side * 0.5 * limit)
 
 
 @pytest.mark.parametrize("kind", PoweredTestKind)
 def test_an_implausible_position_gets_no_torque(kind):
-    proof = PoweredTest(
-        PoweredTestGoal(kind, 2, 5.0, seconds=0.3), CONSTANTS, reading()
-    )
+    test = PoweredTest(PoweredTestGoal(kind, 2, 5.0, seconds=0.3), CONSTANTS, reading())
     jumped = replace(reading(900), jump=PositionJump(motor=3, counts=900, speed=20.0))
-    assert not proof.torque(jumped, WEIGHT).any()
+    assert not test.torque(jumped, WEIGHT).any()
 
 
 def test_a_rest_test_gives_no_torque():
-    proof = PoweredTest(PoweredTestGoal(PoweredTestKind.REST), CONSTANTS, reading())
-    assert not proof.torque(reading(900, j2=0.01), WEIGHT).any()
+    test = PoweredTest(PoweredTestGoal(PoweredTestKind.REST), CONSTANTS, reading())
+    assert not test.torque(reading(900, j2=0.01), WEIGHT).any()
 
 
 @pytest.mark.parametrize(
@@ -232,7 +228,7 @@ def test_goals_at_their_limits_are_accepted(goal):
     ],
 )
 def test_invalid_goals_are_refused(goal):
-    with pytest.raises(ValueError, match=r"no joint|is not a valid proof"):
+    with pytest.raises(ValueError, match=r"no joint|is not a valid powered test"):
         PoweredTest(goal, CONSTANTS, reading())
 
 
