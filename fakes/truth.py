@@ -63,7 +63,7 @@ def truth_records(truth: Truth, frame: TerrainFrame) -> Record:
     velocity, force, hand = rows[:, 10:13], rows[:, 13:16], rows[:, 16:19]
     records["host_ns"] = truth.t_ns
     records["position"] = rows[:, :7]
-    records["sole_position"] = rows[:, 7:10] @ axes + np.array(frame.far_end)
+    records["sole_position"] = rows[:, 7:10] @ axes + np.array(frame.start)
     records["contact_force"] = (force * [-1.0, 1.0, 1.0]) @ axes
     records["hand_force"] = hand @ axes
     records["traction"] = np.column_stack([velocity[:, 0], force[:, 0], force[:, 2]])

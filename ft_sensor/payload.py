@@ -1,14 +1,14 @@
-"""Contact force and slip velocity: from the sensor's reading to force on the foot.
+"""Contact force from the sensor's reading, slip velocity from the joints.
 
-Pure functions, used live in the loop and offline by the analysis. With (f_raw, n_raw)
-the raw wrench, (b, b_n) its bias, s = +1 or -1 the sign of the sensor, m_b and c_b mass
-and centre of mass below the gauges, R_WS the orientation of the sensor in the base
-frame and g_w = (0, 0, -g):
+`LiveFoot` computes them in the loop, the analysis offline with the same functions. With
+(f_raw, n_raw) the raw wrench, (b, b_n) its bias, s = +1 or -1 the sign of the sensor,
+m_b and c_b mass and centre of mass below the gauges, R_WS the orientation of the sensor
+in the base frame and g_w = (0, 0, -g):
 
     F_c = s (f_raw - b) - m_b R_WS^T g_w        in the sensor frame
     n_c = s (n_raw - b_n) - c_b x m_b R_WS^T g_w
 
-Only `to_base` transforms out of the sensor frame.
+Only `to_base` transforms out of the sensor frame: F = R_WS F_c.
 """
 
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 
 
 def cross_matrix(a: Array) -> Array:
-    """Return the matrix X with X b = a x b, shape (3, 3)."""
+    """Return the skew-symmetric matrix X of a, X b = a x b, shape (3, 3)."""
     x, y, z = a.tolist()
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
@@ -109,18 +109,20 @@ def payload_of(tool: Tool) -> Payload:
 
 @dataclass(frozen=True, slots=True)
 class TerrainFrame:
-    """Frame of a terrain: x_T down the slope toward the base, z_T the normal.
+    """Frame of a terrain: x_T along the push, z_T normal to the plane.
+
+    A push goes toward the base, or away from it in the frame `from_other_end`.
 
     Attributes:
-        incline: angle of the plane [rad]; positive: the far end is the high end.
-        heading: direction from the base to the container about z [rad].
-        far_end: point of the plane where trials start [m], shape (3,), base frame.
+        incline: angle of the plane [rad]; positive: trials start at the high end.
+        heading: direction from the end to the start of a trial about z [rad].
+        start: point of the plane where trials start [m], shape (3,), base frame.
         travel: length of a trial along x_T [m].
     """
 
     incline: float
     heading: float
-    far_end: tuple[float, float, float]
+    start: tuple[float, float, float]
     travel: float
 
     def axes(self) -> Array:
@@ -132,24 +134,24 @@ class TerrainFrame:
         return rows @ yaw.T
 
     def from_other_end(self) -> "TerrainFrame":
-        """Return the frame of the opposite direction, which starts at the near end."""
-        near = np.array(self.far_end) + self.travel * self.axes()[0]
-        x, y, z = near.tolist()
+        """Return the frame of a push in the opposite direction, from the other end."""
+        end = np.array(self.start) + self.travel * self.axes()[0]
+        x, y, z = end.tolist()
         return TerrainFrame(-self.incline, self.heading + np.pi, (x, y, z), self.travel)
 
     def displacement(self, position: Floats) -> Floats:
-        """Return the distance from the far end along x_T [m], shape (...)."""
-        return (position - np.array(self.far_end)) @ self.axes()[0]
+        """Return the distance from the start along x_T [m], shape (...)."""
+        return (position - np.array(self.start)) @ self.axes()[0]
 
     def height(self, position: Floats) -> Floats:
         """Return the distance above the plane [m], shape (...)."""
-        return (position - np.array(self.far_end)) @ self.axes()[2]
+        return (position - np.array(self.start)) @ self.axes()[2]
 
 
 def traction(axes: Array, velocity: Floats, force: Floats) -> Floats:
     """Return (v_t, F_t, F_n): slip velocity, traction and normal force, (..., 3).
 
-    v_t = v . x_T, F_t = -F_c . x_T, F_n = F_c . z_T: all positive in ordinary slip.
+    v_t = v . x_T, F_t = -F . x_T, F_n = F . z_T: all positive in ordinary slip.
 
     Args:
         axes: rows x_T, y_T, z_T, shape (3, 3).
@@ -161,7 +163,7 @@ def traction(axes: Array, velocity: Floats, force: Floats) -> Floats:
 
 
 class LiveFoot(FootObserver):
-    """Computes foot pose and traction in every cycle."""
+    """Computes foot pose, slip velocity and traction in every cycle."""
 
     def __init__(
         self, model: ArmModel, payload: Payload, terrain: TerrainFrame

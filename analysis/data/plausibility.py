@@ -311,7 +311,7 @@ def zero_doubts(change: float) -> Iterator[Doubt]:
 def _path(recorded: RecordedTrial, moving: NDArray[np.bool_]) -> Iterator[Doubt]:
     """Compare the path of the sole with the heading and incline of the container."""
     ahead, aside, above = (
-        (recorded.sole[moving] - np.array(recorded.frame.far_end))
+        (recorded.sole[moving] - np.array(recorded.frame.start))
         @ recorded.frame.axes().T
     ).T
     if np.ptp(ahead) < SHORTEST:

@@ -87,7 +87,7 @@ def show(context: CalibrationContext, touched: TouchedContainer) -> None:
     """Print the frame, compared with the row of the matrix."""
     fitted, row, say = touched.fit, context.rig.row, context.console.say
     frame = fitted.frame
-    x, y, z = frame.far_end
+    x, y, z = frame.start
     say(
         f"incline {np.degrees(frame.incline):.2f} degrees (matrix "
         f"{row.incline_deg:g}), heading {np.degrees(frame.heading):.2f} (matrix "

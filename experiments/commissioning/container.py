@@ -4,8 +4,6 @@ The first step in which a person leads the foot under gravity compensation: it
 requires C0 to C11.
 """
 
-from dataclasses import asdict
-
 import numpy as np
 
 from acquisition.errors import SettingsError
@@ -17,6 +15,8 @@ from experiments.commissioning.recording import Values, number
 from experiments.commissioning.scene import Scene
 from experiments.commissioning.step import Step
 from ft_sensor.calibration.fit import fit_terrain
+from ft_sensor.payload import TerrainFrame
+from wam.model.constants import Array
 
 
 def collect(scene: Scene) -> Values:
@@ -33,8 +33,18 @@ def collect(scene: Scene) -> Values:
     )
     with scene.followed():
         points = TERRAIN.collect(CalibrationContext(scene.console_loop))
-    expected = {name: np.array(value) for name, value in asdict(frame).items()}
-    return {"points": np.array(points), **expected}
+    return recorded(np.array(points), frame)
+
+
+def recorded(points: Array, frame: TerrainFrame) -> Values:
+    """Return the values of the step: touched `points` [m], shape (n, 3), and frame."""
+    return {
+        "points": points,
+        "incline": np.array(frame.incline),
+        "heading": np.array(frame.heading),
+        "far_end": np.array(frame.start),
+        "travel": np.array(frame.travel),
+    }
 
 
 def judge(values: Values) -> Judgement:
@@ -47,7 +57,7 @@ def judge(values: Values) -> Judgement:
     difference = touched.heading - number(values, "heading")
     turned = (difference + np.pi) % (2.0 * np.pi) - np.pi
     tilted = touched.incline - number(values, "incline")
-    away = float(np.linalg.norm(np.subtract(touched.far_end, far_end)))
+    away = float(np.linalg.norm(np.subtract(touched.start, far_end)))
     return judged(
         [
             judge_quantity("corners", 1.0, text=""),

@@ -55,7 +55,7 @@ def terrain_frame(row: TerrainRow) -> TerrainFrame:
     frame = TerrainFrame(
         incline=float(np.radians(row.incline_deg)),
         heading=float(np.radians(row.heading_deg)),
-        far_end=row.far_end,
+        start=row.far_end,
         travel=row.travel,
     )
     return frame if row.push_deg == 0 else frame.from_other_end()
@@ -72,7 +72,7 @@ def start_of(row: TerrainRow, model: ArmModel) -> Array:
         SettingsError: the start is out of reach.
     """
     frame = terrain_frame(row)
-    start, axes = np.array(frame.far_end), frame.axes()
+    start, axes = np.array(frame.start), frame.axes()
     if row.start_q is None:
         try:
             return elbow_up(model, axes, start)

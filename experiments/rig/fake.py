@@ -94,7 +94,7 @@ class SimulatedRig:
             "frame": {
                 "incline": frame.incline,
                 "heading": frame.heading,
-                "far_end": list(frame.far_end),
+                "far_end": list(frame.start),
                 "travel": frame.travel,
             },
             "start_q": start.tolist(),

@@ -21,7 +21,7 @@ def container_box(frame: TerrainFrame) -> ObstacleBox:
     depth = _highest(frame) + BASE_HEIGHT
     size = np.array([frame.travel + 2.0 * _BEYOND, 2.0 * _BESIDE, depth + RIM])
     middle = np.array([0.5 * frame.travel, 0.0, 0.5 * (RIM - depth)])
-    center = np.array(frame.far_end) + middle @ axes
+    center = np.array(frame.start) + middle @ axes
     return ObstacleBox("the container", center, size, axes.T)
 
 
@@ -36,4 +36,4 @@ def free_space(settings: Settings, row: TerrainRow) -> FreeSpace:
 
 def _highest(frame: TerrainFrame) -> float:
     """Height of the higher end of a container [m]."""
-    return max(frame.far_end[2], frame.from_other_end().far_end[2])
+    return max(frame.start[2], frame.from_other_end().start[2])

@@ -166,7 +166,7 @@ class _Reader:
         measured = {
             "incline_deg": float(np.degrees(frame.incline)),
             "heading_deg": float(np.degrees(frame.heading)),
-            "far_end": frame.far_end,
+            "far_end": frame.start,
             "travel": frame.travel,
         }
         return _checked(TerrainRow, {**row.model_dump(), **measured})

@@ -135,7 +135,7 @@ def _move_to_terrain_frame(
 ) -> None:
     """Make the terrain frame the world frame of the model."""
     axes = frame.axes()
-    base = pin.SE3(axes, -axes.dot(frame.far_end))
+    base = pin.SE3(axes, -axes.dot(frame.start))
     model.jointPlacements[1] = base * model.jointPlacements[1]
     gravity = np.linalg.norm(model.gravity.linear)
     model.gravity.linear = axes.dot(np.array(down) / np.linalg.norm(down)) * gravity

@@ -84,7 +84,7 @@ def solve_start(model: ArmModel, frame: TerrainFrame, q: Array, height: float) -
     Raises:
         SettingsError: as `lowered_to`.
     """
-    return lowered_to(model, frame.axes(), np.array(frame.far_end), q, height)
+    return lowered_to(model, frame.axes(), np.array(frame.start), q, height)
 
 
 class FakeRig:

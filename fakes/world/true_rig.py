@@ -73,7 +73,7 @@ def true_network(believed: NetworkOptions, deviation: RigDeviation) -> NetworkOp
 def true_frame(believed: TerrainFrame, deviation: RigDeviation) -> TerrainFrame:
     """Return the true location of the container in the rotated base frame."""
     place, yaw = deviation.place, float(deviation.mount[2])
-    shifted = np.array(believed.far_end) + place.far_end
+    shifted = np.array(believed.start) + place.far_end
     x, y, z = (rotation((0.0, 0.0, yaw)).T @ shifted).tolist()
     return TerrainFrame(
         believed.incline + place.incline,

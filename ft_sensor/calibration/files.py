@@ -79,7 +79,7 @@ def terrain_to_toml(name: str, frame: TerrainFrame, fields: Mapping[str, str]) -
         name=name,
         incline=float(frame.incline),
         heading=float(frame.heading),
-        far_end=[float(value) for value in frame.far_end],
+        far_end=[float(value) for value in frame.start],
         travel=float(frame.travel),
         facts=fields,
     )

@@ -16,7 +16,7 @@ from wam.model.tool import Tool, sensor_body
 CONSTANTS = load_constants()
 FOOT = Body(0.45, np.array([0.01, 0.0, 0.062]), np.diag([4e-4, 5.5e-4, 4.5e-4]))
 TOOL = Tool(sensor_body(), FOOT, np.array([0.01, 0.0, 0.112]))
-FRAME = TerrainFrame(incline=0.0, heading=0.0, far_end=(0.70, 0.0, 0.12), travel=0.45)
+FRAME = TerrainFrame(incline=0.0, heading=0.0, start=(0.70, 0.0, 0.12), travel=0.45)
 START_Q = np.array([0.0, 0.7696, 0.0, 1.1857, 0.0, 1.1863, 0.0])
 MODEL = ArmModel(CONSTANTS, TOOL)
 CYCLE_NS = 2_000_000
@@ -53,7 +53,7 @@ def float_for(plant, seconds, virtual_mass=0.0):
 def sole(plant):
     """Return the sole in the frame of the terrain [m]."""
     position = MODEL.sole_pose(plant.q)[0]
-    return FRAME.axes() @ (position - np.array(FRAME.far_end))
+    return FRAME.axes() @ (position - np.array(FRAME.start))
 
 
 def make_rig(seed=1, terrain="S0", stones="small", network=None):

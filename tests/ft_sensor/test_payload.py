@@ -159,8 +159,8 @@ def test_the_payload_of_a_tool_is_its_foot_in_the_sensor_frame(example_tool):
     assert not payload.bias.any()
 
 
-def terrain(incline_deg, heading=0.0, far_end=(0.9, 0.1, -0.3)):
-    return TerrainFrame(np.deg2rad(incline_deg), heading, far_end, 0.45)
+def terrain(incline_deg, heading=0.0, start=(0.9, 0.1, -0.3)):
+    return TerrainFrame(np.deg2rad(incline_deg), heading, start, 0.45)
 
 
 @pytest.mark.parametrize("incline_deg", INCLINES)
@@ -188,9 +188,9 @@ def test_from_the_other_end_the_plane_is_crossed_in_reverse(incline_deg):
     back = frame.from_other_end()
     turned = np.diag([-1.0, -1.0, 1.0])
     assert np.allclose(back.axes(), turned @ frame.axes(), atol=EXACT)
-    there = np.array(back.far_end)
+    there = np.array(back.start)
     assert frame.displacement(there) == pytest.approx(frame.travel, abs=EXACT)
-    assert np.allclose(back.from_other_end().far_end, frame.far_end, atol=EXACT)
+    assert np.allclose(back.from_other_end().start, frame.start, atol=EXACT)
 
 
 @pytest.mark.parametrize("incline_deg", [10.0, 15.0])
@@ -204,15 +204,15 @@ def test_a_trial_goes_downhill_and_toward_the_base(incline_deg):
 
 @pytest.mark.parametrize("incline_deg", INCLINES)
 @pytest.mark.parametrize("heading", [0.0, 0.6])
-def test_displacement_grows_from_the_far_end_and_height_above_the_plane(
+def test_displacement_grows_from_the_start_and_height_above_the_plane(
     incline_deg, heading
 ):
     frame = terrain(incline_deg, heading)
     x, y, z = frame.axes()
-    point = np.array(frame.far_end) + 0.3 * x - 0.05 * y + 0.02 * z
+    point = np.array(frame.start) + 0.3 * x - 0.05 * y + 0.02 * z
     assert frame.displacement(point) == pytest.approx(0.3, abs=EXACT)
     assert frame.height(point) == pytest.approx(0.02, abs=EXACT)
-    path = np.array([frame.far_end, point])
+    path = np.array([frame.start, point])
     assert np.allclose(frame.displacement(path), [0.0, 0.3], atol=EXACT)
     assert np.allclose(frame.height(path), [0.0, 0.02], atol=EXACT)
 

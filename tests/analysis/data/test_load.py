@@ -114,7 +114,7 @@ def test_traction_is_velocity_and_force_in_the_frame_of_the_terrain(trial):
 
 
 def test_the_displacement_is_counted_from_the_far_end(trial):
-    wanted = (trial.sole - np.array(FRAME.far_end)) @ FRAME.axes()[0]
+    wanted = (trial.sole - np.array(FRAME.start)) @ FRAME.axes()[0]
     assert trial.displacement == pytest.approx(wanted)
 
 

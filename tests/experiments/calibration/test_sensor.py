@@ -288,7 +288,7 @@ def test_a_touched_plate_gives_incline_and_heading(tmp_path):
     assert name == "TF"
     assert np.degrees(frame.incline) == pytest.approx(row.incline_deg, abs=0.2)
     assert np.degrees(frame.heading) == pytest.approx(row.heading_deg, abs=1.0)
-    assert frame.far_end == pytest.approx(row.far_end, abs=0.004)
+    assert frame.start == pytest.approx(row.far_end, abs=0.004)
     assert frame.travel == pytest.approx(row.travel, abs=0.004)
     assert "0.0 mm rms off the plane" in done.out
 

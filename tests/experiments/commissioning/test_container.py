@@ -1,6 +1,6 @@
 """C13: a container that agrees with its row passes; a wrong entry is named."""
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -22,14 +22,14 @@ def frame():
 def touched(true, typed, noise=0.0):
     """Recording of C13 where the corners of `true` are touched."""
     along, across, _ = true.axes()
-    far = np.array(true.far_end)
+    far = np.array(true.start)
     corners = [
         far + along * distance + across * side
         for distance in (0.0, true.travel)
         for side in (HALF_WIDTH, -HALF_WIDTH)
     ]
     points = np.array(corners) + np.random.default_rng(1).normal(0.0, noise, (4, 3))
-    return {"points": points, **{k: np.array(v) for k, v in asdict(typed).items()}}
+    return container.recorded(points, typed)
 
 
 def test_a_container_as_typed_passes(frame):
@@ -42,7 +42,7 @@ def test_a_container_as_typed_passes(frame):
         ({"incline": np.radians(5.0)}, "Wrong incline"),
         ({"incline": np.radians(-20.0)}, "Wrong incline"),
         ({"heading": np.radians(20.0)}, "Wrong heading"),
-        ({"far_end": np.array([0.0, 0.0, -0.1])}, "Wrong far_end"),
+        ({"start": np.array([0.0, 0.0, -0.1])}, "Wrong far_end"),
         ({"travel": -0.1}, "travel is longer than the container"),
     ],
 )
@@ -54,7 +54,7 @@ def test_a_wrong_entry_is_reported(frame, changes, words):
 
 def test_headings_are_compared_across_half_a_turn(frame):
     true = replace(frame, heading=np.pi - 0.01)
-    typed = replace(frame, heading=-np.pi + 0.01, far_end=true.far_end)
+    typed = replace(frame, heading=-np.pi + 0.01, start=true.start)
     assert container.judge(touched(true, typed)).cause == ""
 
 

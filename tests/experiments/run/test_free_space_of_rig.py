@@ -29,7 +29,7 @@ def test_a_container_box_reaches_to_the_floor_and_beyond_the_trial(name):
     box = container_box(frame)
     half = 0.5 * box.size
     for along in (0.0, frame.travel):
-        point = np.array(frame.far_end) + along * frame.axes()[0]
+        point = np.array(frame.start) + along * frame.axes()[0]
         inside = np.abs(box.rotation.T @ (point - box.center))
         assert (inside < half).all()
     bottom = box.center - half[2] * box.rotation[:, 2]

@@ -196,7 +196,7 @@ def test_gravity_follows_the_mounting_of_the_base(build, name, down):
 
 def test_a_turned_base_moves_the_container():
     frame = true_frame(FRAME, wrong_rig("base-turned-90deg").deviation)
-    assert frame.far_end == pytest.approx((0.0, -0.70, 0.12))
+    assert frame.start == pytest.approx((0.0, -0.70, 0.12))
     assert frame.axes()[0] == pytest.approx([0.0, 1.0, 0.0], abs=1e-9)
 
 
@@ -331,7 +331,7 @@ def test_containers_have_the_stated_deviation():
         return true_frame(replace(FRAME, incline=0.2), wrong_rig(name).deviation)
 
     assert frame("incline-off-5deg").incline == pytest.approx(0.2 + np.radians(5.0))
-    assert frame("far-end-off-100mm").far_end == pytest.approx((0.70, 0.0, 0.02))
+    assert frame("far-end-off-100mm").start == pytest.approx((0.70, 0.0, 0.02))
     assert frame("travel-too-long").travel == pytest.approx(FRAME.travel - 0.1)
 
 

@@ -22,7 +22,7 @@ def corners(terrain, more=()):
     axes = terrain.axes()
     outline = [(0, 1), (0, -1), (LENGTH, 1), (LENGTH, -1)]
     flat = [(x, y * HALF_WIDTH) for x, y in outline] + list(more)
-    return np.array([terrain.far_end + x * axes[0] + y * axes[1] for x, y in flat])
+    return np.array([terrain.start + x * axes[0] + y * axes[1] for x, y in flat])
 
 
 @given(st.floats(0, 30), st.floats(-170, 170))
@@ -31,7 +31,7 @@ def test_a_plate_is_recovered_from_touched_points(incline_deg, heading_deg):
     fit = fit_terrain(corners(expected, [(0.2, 0.0), (0.3, 0.05)]))
     assert fit.frame.incline == pytest.approx(expected.incline, abs=1e-9)
     assert fit.frame.heading == pytest.approx(expected.heading, abs=1e-9)
-    assert fit.frame.far_end == pytest.approx(expected.far_end, abs=1e-9)
+    assert fit.frame.start == pytest.approx(expected.start, abs=1e-9)
     assert fit.frame.travel == pytest.approx(LENGTH, abs=1e-9)
     assert fit.residual < 1e-9
     assert abs(fit.roll) < 1e-9

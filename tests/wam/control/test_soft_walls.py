@@ -147,10 +147,8 @@ def test_no_trial_of_the_shipped_matrix_touches_a_wall(foot_model):
         frame = terrain_frame(row)
         for height in (0.06, 0.0):  # carried to the far end, then pushed across
             for along in np.linspace(0.0, row.travel, 10):
-                x, y, z = (np.array(frame.far_end) + along * frame.axes()[0]).tolist()
-                q = solve_start(
-                    foot_model, replace(frame, far_end=(x, y, z)), q, height
-                )
+                x, y, z = (np.array(frame.start) + along * frame.axes()[0]).tolist()
+                q = solve_start(foot_model, replace(frame, start=(x, y, z)), q, height)
                 assert (q > constants.q_lower + DEPTH).all()
                 assert (q < constants.q_upper - DEPTH).all()
 

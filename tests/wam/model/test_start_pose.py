@@ -38,7 +38,7 @@ def test_the_sole_is_flat_on_the_far_end(changes):
     cell = row(start_q=None, **changes)
     q, frame = start_of(cell, MODEL), terrain_frame(cell)
     position, rotation = MODEL.sole_pose(q)
-    assert position == pytest.approx(frame.far_end, abs=1e-6)
+    assert position == pytest.approx(frame.start, abs=1e-6)
     axes = frame.axes()
     assert rotation[:, 2] == pytest.approx(-axes[2], abs=1e-6)
     assert abs(rotation[:, 0] @ axes[0]) == pytest.approx(1.0, abs=1e-6)
@@ -50,7 +50,7 @@ def test_the_sole_is_flat_on_the_far_end(changes):
 
 def test_the_start_pose_of_an_opposite_push_is_at_the_other_end():
     q = start_of(row(push_deg=180), MODEL)
-    near = terrain_frame(row(push_deg=180)).far_end
+    near = terrain_frame(row(push_deg=180)).start
     assert MODEL.sole_pose(q)[0] == pytest.approx(near, abs=1e-6)
 
 
@@ -60,7 +60,7 @@ def test_a_push_in_the_other_direction_crosses_the_same_plane():
     assert up.axes()[2] == pytest.approx(down.axes()[2])
     assert up.incline == -down.incline
     back = up.from_other_end()
-    assert back.far_end == pytest.approx(down.far_end)
+    assert back.start == pytest.approx(down.start)
     assert back.axes() == pytest.approx(down.axes())
 
 
