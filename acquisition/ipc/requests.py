@@ -1,6 +1,7 @@
 """Requests between processes: typed messages as JSON over a `Channel`, never pickled.
 
-For use between trials only, not in a running loop.
+Both ends block, so the thread of the control loop never uses them: the control process
+answers only before its loop starts and after it ends.
 
 A request is a dataclass whose fields are sent; a `Request[X]` has an answer of type X.
 A `Dispatcher` maps the requests that a process answers to functions. Fields and answers
