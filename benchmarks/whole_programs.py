@@ -20,7 +20,7 @@ from benchmarks.rows import BenchRow
 TRIALS = Path(__file__).parents[2] / "shared" / "data" / "rehearsal_trials.npz"
 _TERRAINS = ("S0", "TF")
 _SUBREAPER = 36  # PR_SET_CHILD_SUBREAPER of prctl(2)
-# Goals [s]; the one of the study assumes SciPy's optimiser.
+# Goals [s]; that of the study assumes SciPy's optimiser.
 _DEMO_GOAL_S, _REPEAT_GOAL_S, _STUDY_GOAL_S = 30.0, 4.0, 100.0
 
 
@@ -56,7 +56,7 @@ def cpu_time() -> float:
 
 
 def demo_rows(folder: Path) -> list[BenchRow]:
-    """Return the durations of the demo without installation and of a second report."""
+    """Return the times of the demo without installation and of a second report."""
     data = ("--data", str(folder))
     begin = time.perf_counter()
     wait_for(*(start("run", row, "--fake", "--fast", *data) for row in _TERRAINS))
@@ -74,7 +74,7 @@ def demo_rows(folder: Path) -> list[BenchRow]:
             note=f"sessions {recording:.0f} s, report {whole - recording:.0f} s",
         ),
         BenchRow(
-            "repeated report of 20 trials, results stored",
+            "repeated report of 20 trials, results stored, processor time",
             cpu_time() - before,
             "s",
             _REPEAT_GOAL_S,

@@ -50,7 +50,7 @@ COMMANDS = {
     "rehearse": "simulate the whole study and check it against acceptance bands",
     "report": "fit and compare models of recorded sessions, write the report",
     "identify": "classify the terrain of a trial: probabilities over time",
-    "fit": "fit and compare models of external data, npz or CSV",
+    "fit": "fit and compare models of tables: CSV, Parquet, npz or an export",
 }
 _MODULES = {"import": "import_log"}  # commands named like Python keywords
 _DISK_ERRORS = {

@@ -222,7 +222,9 @@ def add_table_options(parser: ArgumentParser) -> None:
         metavar="HZ",
         help="sampling rate of a CSV without a time column",
     )
-    group.add_argument("--terrain", metavar="NAME", help="terrain of the CSV files")
+    group.add_argument(
+        "--terrain", metavar="NAME", help="terrain of the CSV and Parquet files"
+    )
 
 
 def add_scheduler_option(parser: ArgumentParser) -> None:
@@ -290,7 +292,7 @@ def add_recording_options(parser: ArgumentParser) -> None:
         "--operator-script",
         metavar="FILE|auto",
         help="keys, one per line: keep, redo 1..5, remark TEXT, quit; before a trial "
-        "pause, note TEXT, view, last",
+        "pause, note TEXT, view, last, undo",
     )
     parser.add_argument(
         "--new", action="store_true", help="close an unfinished session first"

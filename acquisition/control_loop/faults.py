@@ -1,4 +1,4 @@
-"""Catalogue of the faults that stop the arm: recorded name, details, action.
+"""Catalogue of faults and the reaction to each: recorded name, details, action.
 
 `FAULTS` has one row per fault. The operator's texts have the same names in
 `experiments/data/messages.toml`; tests compare the two.
@@ -52,7 +52,7 @@ _SEVERITY = {action: severity for severity, action in enumerate(Action)}
 
 
 class Fault(StrEnum):
-    """Reason for a stop; the value is its name in recordings and messages."""
+    """Reason for a reaction of the guard; the value is its recorded name."""
 
     E_STOP = "estop"
     PENDANT_IDLE = "pendant-idle"

@@ -184,9 +184,9 @@ def check(
 def _check_idle(seen: Observation) -> GuardVerdict:
     """Check an arm that is idle or not yet active.
 
-    Position requests alone feed the heartbeat: an arm activated without torques would
-    drop. Torques commanded without a requested activation would drive the arm when the
-    pendant is next pressed.
+    Replies to position requests suffice to feed the heartbeat monitor: an arm activated
+    without torques would drop. Torques commanded without a requested activation would
+    drive the arm when the pendant is next pressed.
     """
     if seen.reading.disobeys is not None:
         return verdict_for(Fault.PUCK_DISOBEYS, seen.reading.disobeys)

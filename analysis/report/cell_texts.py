@@ -47,17 +47,17 @@ def paired_cell(paired: PairedComparison | None, adjusted: float | None = None) 
     if paired is None:
         return "–"
     error = "" if paired.standard_error is None else f" ± {paired.standard_error:.3f}"
-    together = "" if adjusted is None else f", Holm {adjusted:.2g}"
-    return f"{paired.difference:+z.3f}{error} (p {paired.p:.2g}{together})"
+    holm = "" if adjusted is None else f", Holm {adjusted:.2g}"
+    return f"{paired.difference:+z.3f}{error} (p {paired.p:.2g}{holm})"
 
 
 def holm_note(pairs: Sequence[PairedComparison | None]) -> str:
     """Explain how p is adjusted for the comparisons of a table."""
     present = [pair for pair in pairs if pair is not None]
     return (
-        f"Holm: p adjusted for the {len(present)} comparisons of this table; only "
-        "below 0.05 is a difference more than chance. So many comparisons over so few "
-        f"trials cannot go below {smallest_adjusted(present):.2g}."
+        f"Holm: p adjusted for the {len(present)} comparisons of this table; a "
+        "difference with p of 0.05 or more may be chance. With so many comparisons and "
+        f"so few trials the smallest possible p is {smallest_adjusted(present):.2g}."
     )
 
 

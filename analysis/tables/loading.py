@@ -81,8 +81,8 @@ def load_tables(
         columns: name of each column of the analysis in a CSV or Parquet file, or its
             position from "1"; by default its own name. In addition "trial" and
             "terrain": text columns that divide a CSV into several trials.
-        terrain: terrain of every CSV; by default that of its data package, or "table".
-            An npz names its own.
+        terrain: terrain of every CSV and Parquet file; by default that of its data
+            package, or "table". An npz or an exported folder names its own.
         stones: size of the stones by terrain: "small", "big" or "none"; if not given,
             see `analysis.data.terrain_kinds.terrain_kind`.
         units: unit of each column without a unit in the header, e.g. {"v_t": "mm/s"};

@@ -73,7 +73,7 @@ class FootKeys:
         self._loop_client = loop_client
 
     def key(self, key: str) -> str:
-        """Return `key` when the foot was tapped twice since the last call, else ""."""
+        """Return `key` if a double tap has ended since the last call, else ""."""
         if self._taps is None:
             return ""
         records = self._loop_client.last(_SECONDS)

@@ -1,8 +1,8 @@
 """One program per arm and host: a file lock, released when its owner dies.
 
 There is one file per interface and channel, in a folder that every user may write to.
-It is never removed, so that all programs lock the same file. Only the kernel's lock is
-trusted: the content merely names the owner.
+It is never removed, so that all programs lock the same file. Only the lock of the
+Linux kernel is trusted: the content merely names the owner.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class ArmOwner:
     Attributes:
         pid: process id.
         command: its command line.
-        since: time of day [UTC] at which it took the arm.
+        since: date and time [UTC] at which it took the arm.
     """
 
     pid: str = "?"
@@ -65,7 +65,7 @@ class ArmLock:
         Raises:
             PreflightError: another process has the arm, or the file cannot be used.
         """
-        import fcntl  # Linux only; other systems have no arm
+        import fcntl  # not on Windows; only Linux drives an arm
 
         self.path = lock_folder(folders) / lock_name(interface, channel)
         self._descriptor = _open_safely(self.path)
@@ -113,7 +113,7 @@ def lock_folder(folders: Sequence[Path] = FOLDERS) -> Path:
 
 
 def lock_name(interface: str, channel: str) -> str:
-    """Return the name of the lock file; links to a path are resolved."""
+    """Return the name of the lock file; symbolic links in a path are resolved."""
     if interface == "traction-fake" or "/" in channel:
         channel = os.path.realpath(channel)
     name = quote(f"{interface}:{channel}", safe="")
@@ -135,7 +135,7 @@ def _open_safely(path: Path) -> int:
     fields = os.fstat(descriptor)
     if not stat.S_ISREG(fields.st_mode) or fields.st_nlink != 1:
         os.close(descriptor)
-        raise _unusable(path, "it is not a regular file")
+        raise _unusable(path, "it is not a regular file with a single link")
     return descriptor
 
 

@@ -25,7 +25,7 @@ class LockOwner:
 
     Attributes:
         pid: process id, 0 if not written yet.
-        since: time of day [UTC] at which it opened the session.
+        since: date and time [UTC] at which it opened the session.
     """
 
     pid: int

@@ -210,8 +210,8 @@ class WamArm:
     def listen(self, now_ns: int) -> ArmReading:
         """Receive without requesting positions or waiting.
 
-        Position replies feed the watchdog of the safety module (its heartbeat
-        monitor): without them it idles the arm.
+        Without position replies the watchdog of the safety module (its heartbeat
+        monitor) times out and idles the arm.
         """
         self._traffic.listen(now_ns)
         return self._reading(now_ns)

@@ -135,14 +135,14 @@ def test_a_hard_link_in_place_of_the_lock_is_not_written_to(shared, tmp_path):
     victim = tmp_path / "precious"
     victim.write_text("precious")
     (shared / lock_name("socketcan", "can7")).hardlink_to(victim)
-    with pytest.raises(PreflightError, match="not a regular file"):
+    with pytest.raises(PreflightError, match="not a regular file with a single link"):
         take(shared)
     assert victim.read_text() == "precious"
 
 
 def test_a_pipe_in_place_of_the_lock_is_refused_without_waiting(shared):
     os.mkfifo(shared / lock_name("socketcan", "can7"))
-    with pytest.raises(PreflightError, match="not a regular file"):
+    with pytest.raises(PreflightError, match="not a regular file with a single link"):
         take(shared)
 
 
