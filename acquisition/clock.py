@@ -63,7 +63,7 @@ class SystemClock:
     """Clock of the machine: CLOCK_MONOTONIC, absolute deadlines.
 
     For the last `spin_ns` before a deadline it busy-waits, which hides late wake-ups of
-    the kernel at the cost of a busy core.
+    the Linux kernel at the cost of a busy core.
     """
 
     def __init__(self, spin_ns: int = 0) -> None:

@@ -138,7 +138,8 @@ class WrenchSample:
     Attributes:
         t_ns: best estimate of the monotonic time of acquisition [ns].
         counter: device time or counter as received; 0 = the device has none.
-        wrench: fx fy fz tx ty tz in the sensor frame [N, N m], calibrated, not tared.
+        wrench: fx fy fz tx ty tz in the sensor frame [N, N m], calibrated; the tare,
+            taken in `experiments.run.tare`, is not subtracted.
         status: device status bits as received.
         is_valid: the device reports valid data.
         saturated: bit i set = axis i (fx fy fz tx ty tz) is beyond its range.

@@ -1,7 +1,7 @@
 """Settings of OpenBLAS and malloc for matrices of a few hundred rows.
 
 Environment variables, set before numpy loads OpenBLAS: one thread, because more would
-wait for busy cores; and the kernel to use on processors newer than the library.
+wait for busy cores; and its matrix routines for processors newer than the library.
 OpenBLAS 0.3.31 knows AMD families up to 25 and treats later ones as a Haswell of 2013,
 whose matrix products take a third longer.
 

@@ -174,7 +174,11 @@ class LiveFoot(FootObserver):
         self._force_axes = np.stack((-self._x_T, z_T))  # F_t = -x_T.F, F_n = z_T.F
 
     def set_bias(self, bias: Sequence[float]) -> None:
-        """Set the sensor's reading without load [N, N m], six numbers."""
+        """Set the tare, taken in `experiments.run.tare`.
+
+        Args:
+            bias: the sensor's reading without load [N, N m], six numbers.
+        """
         self.payload = replace(self.payload, bias=np.array(bias))
 
     def observe(

@@ -169,7 +169,11 @@ class Cycle:
         self._powered_test = goal
 
     def set_bias(self, bias: Sequence[float]) -> None:
-        """Set the sensor's reading without load [N, N m], six numbers."""
+        """Set the tare, taken in `experiments.run.tare`.
+
+        Args:
+            bias: the sensor's reading without load [N, N m], six numbers.
+        """
         self._observer.set_bias(bias)
         self._is_tared = True
 

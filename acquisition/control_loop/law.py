@@ -68,7 +68,10 @@ class ControlLaw(Protocol):
         ...
 
     def joint7_offset(self, reading: ArmReading) -> float:
-        """Return the offset of joint 7 from its locked position [rad]."""
+        """Return the offset of joint 7 from its locked position [rad].
+
+        The lock is in `wam.control.joint_lock`.
+        """
         ...
 
 
@@ -82,5 +85,9 @@ class FootObserver(Protocol):
         ...
 
     def set_bias(self, bias: Sequence[float]) -> None:
-        """Set the sensor's reading without load [N, N m], six numbers."""
+        """Set the tare, taken in `experiments.run.tare`.
+
+        Args:
+            bias: the sensor's reading without load [N, N m], six numbers.
+        """
         ...

@@ -1,4 +1,4 @@
-"""Real-time settings of a process: requests to the kernel and their results."""
+"""Real-time priority (SCHED_FIFO), processor core and memory lock of a process."""
 
 import ctypes
 import errno
@@ -29,7 +29,7 @@ class RealtimeRequest:
         nice: nice value for normal scheduling.
         lock_memory: lock all memory and disable the garbage collector.
         limit_wakeup_latency: forbid deep idle states of the processors while
-            the process lives; skipped if the kernel has no such interface.
+            the process lives; skipped if the Linux kernel has no such interface.
     """
 
     priority: int = 0
@@ -41,7 +41,7 @@ class RealtimeRequest:
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """Result of one request: name, whether granted, reason of a refusal."""
+    """Result of one request: name, whether granted, reason for a refusal."""
 
     what: str
     is_granted: bool

@@ -1,10 +1,10 @@
-"""Return of free heap memory to the kernel after a trial."""
+"""Return of free heap memory to the Linux kernel after a trial."""
 
 import ctypes
 
 
 def trim_heap() -> None:
-    """Return free heap memory to the kernel, if the C library has malloc_trim.
+    """Return free heap memory to the Linux kernel, if the C library has malloc_trim.
 
     Otherwise the fragmented heap of a finished trial stays with the process.
     """

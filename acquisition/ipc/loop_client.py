@@ -133,7 +133,11 @@ class LoopClient:
         self._asked = self._commands.post(StartPoweredTest(goal))
 
     def set_bias(self, bias: Sequence[float]) -> None:
-        """Set the sensor's reading without load [N, N m], six numbers."""
+        """Set the tare, taken in `experiments.run.tare`.
+
+        Args:
+            bias: the sensor's reading without load [N, N m], six numbers.
+        """
         self._commands.post(SetBias(tuple(bias)))
 
     def watch_trial(self, *, is_recording: bool) -> None:

@@ -128,7 +128,7 @@ class LoopServer:
         self._is_orphaned = True
 
     def _watch(self, now_ns: int) -> None:
-        """Stop the arm if console or recorder miss their heartbeat."""
+        """Watchdog of console and recorder: hold if a heartbeat times out."""
         heartbeats = self._shared.heartbeats
         console_ns = now_ns - heartbeats.last_ns(_CONSOLE)
         if console_ns > SILENT_NS:

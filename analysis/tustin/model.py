@@ -157,7 +157,7 @@ def predict(
     v_t: Array,
     form: TustinForm | None = None,
 ) -> Array:
-    """Return F_t [N] by eq. (1), odd in v_t; at standstill the static force F_s."""
+    """Return F_t [N] of the Stribeck curve (1), odd in v_t; at standstill F_s."""
     p = parameters
     e = np.exp(-stribeck_power(np.abs(v_t), p.v_s, p.delta_s))
     sign = np.where(v_t < 0, -1.0, 1.0)

@@ -203,13 +203,13 @@ class FakeSafetyModule:
         self._check_torque()
 
     def _restart_heartbeat(self) -> None:
-        """Restart the heartbeat timeout, while ACTIVE."""
+        """Restart the watchdog (heartbeat monitor), while ACTIVE."""
         is_active = self.mode is SafetyMode.ACTIVE
         due_ns = self._schedule.now_ns + self._heartbeat_ns
         self._schedule.set_alarm(due_ns if is_active else NEVER)
 
     def _expire_heartbeat(self) -> None:
-        """Fault the arm: no positions within the heartbeat timeout."""
+        """Fault the arm: the watchdog (heartbeat monitor) has timed out."""
         self._fault("heartbeat")
 
     def _answer(self, number: int, name: str) -> None:

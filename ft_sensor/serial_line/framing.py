@@ -1,4 +1,7 @@
-"""Scanner for frames of fixed size in a possibly damaged byte stream."""
+"""Scanner for frames of fixed size in a possibly damaged byte stream.
+
+The decoder of each vendor verifies the checksum (a CRC or a sum) of its frames.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass

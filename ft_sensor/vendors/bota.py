@@ -110,7 +110,7 @@ def encode_frame(frame: BotaFrame) -> bytes:
 
 
 def decode_frame(data: bytes, start: int = 0) -> BotaFrame | None:
-    """Return the frame in the 37 bytes from `start`; None if they are not one.
+    """Verify the CRC of 37 bytes from `start` and return their frame, or None.
 
     The CRC over data and checksum has a constant residue, so the checksum need not be
     extracted and compared.

@@ -1,8 +1,8 @@
 """Codec of the serial protocol of OptoForce / OnRobot HEX 6-axis sensors; no I/O.
 
 A data frame has 22 bytes: header AA 07 08 10, 16-bit counter, status, six counts and
-16-bit sum, all big-endian. The scale differs from unit to unit: the sensitivity report
-of the unit gives six sensitivities.
+a checksum (16-bit sum), all big-endian. The scale differs from unit to unit: the
+sensitivity report of the unit gives six sensitivities.
 """
 
 import struct

@@ -1,6 +1,6 @@
 """Codec of the serial protocol of Robotous RFT sensors; no I/O.
 
-A packet begins with 0x55 and ends with the 8-bit sum of its data field and 0xAA.
+A packet begins with 0x55 and ends with a checksum, the 8-bit sum of its data, and 0xAA.
 Commands have eight data bytes, replies and samples sixteen, the first of which repeats
 the command. A sample has six big-endian counts and one overload bit per axis, but no
 counter and no clock.

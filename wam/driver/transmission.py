@@ -104,7 +104,7 @@ class Transmission:
         return self._tau_of_units.dot(units)
 
     def command(self, tau: Vector, tau_gravity: Vector) -> TorqueCommand:
-        """Return the torques to send for `tau`, within the limits of every motor.
+        """Clip joint torques to the limits of every motor; return the command to send.
 
         Beyond a limit the gravity part is kept and the remainder scaled by one factor,
         so that the arm neither drops nor changes the direction of its force. Rounding

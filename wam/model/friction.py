@@ -1,11 +1,11 @@
-"""Dry and viscous friction of the drives, as torques at the motors.
+"""Coulomb, Stribeck and viscous friction of the drives, as torques at the motors.
 
 Friction acts where the cables run over pulleys, so it is modelled at the motors: both
 motors of a differential have friction whenever either of its joints turns. The steady
 torque of a motor at speed w is
 
     g(w) = (F_c +- F_a + mu (|tau| - |tau_0|)) (1 + ripple) S(w)
-    S(w) = 1 + (s - 1) / (1 + (w / w_s)^2)
+    S(w) = 1 + (s - 1) / (1 + (w / w_s)^2)        Stribeck curve
 
 against the motion, plus b w. Below g a bristle deflects elastically, as in the
 elasto-plastic model of Dupont, Hayward, Armstrong and Altpeter (2002): the deflection
