@@ -128,13 +128,13 @@ def _note_changes(args: argparse.Namespace, files: RecordFolder) -> None:
     from datetime import UTC, datetime
 
     from acquisition.clock import SystemClock
-    from experiments.commissioning.evidence.order import REPORTED_BASES
+    from experiments.commissioning.evidence.order import REPORTED_INPUTS
 
     if not files.record.steps:
         return
     now = datetime.fromtimestamp(SystemClock().utc_ns() // 1_000_000_000, UTC)
     for name, is_reported in zip(
-        REPORTED_BASES, (args.moved, args.tensioned), strict=True
+        REPORTED_INPUTS, (args.moved, args.tensioned), strict=True
     ):
         if is_reported:
             files.report_change(name, now)

@@ -23,7 +23,7 @@ from experiments.commissioning.evidence.daily_record import (
     write_history,
 )
 from experiments.commissioning.evidence.gate import lacks, require
-from experiments.commissioning.evidence.order import BASES, StepId
+from experiments.commissioning.evidence.order import STEP_INPUTS, StepId
 from experiments.commissioning.fits import angle, fit_foot, orientations
 from experiments.commissioning.guide import RecordFolder
 from experiments.commissioning.judging import (
@@ -51,7 +51,7 @@ from wam.model.constants import Array, load_constants
 HANGING = (0, 2, 3, 4)  # indices of POSES: foot down, to both sides, ahead
 LIFTED = (2, -4)  # joints, signed by the direction of the lift
 _LISTENED = 2.0  # s, duration of silent listening
-_DEVICES = ("pucks", "motors", "module", "sensor")  # keys of `BASES`
+_DEVICES = ("pucks", "motors", "module", "sensor")  # keys of `STEP_INPUTS`
 _REMEDY = (
     "Look at what is named. What changed for good is commissioned again, from the step "
     "that measures it: traction commission --from STEP."
@@ -259,7 +259,7 @@ def _part(values: Values, prefix: str) -> Values:
 def _changed(files: RecordFolder, present: Mapping[str, str]) -> list[str]:
     """Describe the devices whose identity has changed since the commissioning."""
     return [
-        BASES[name].words
+        STEP_INPUTS[name].words
         for name in _DEVICES
         if any(
             name in present and done.inputs.get(name, present[name]) != present[name]

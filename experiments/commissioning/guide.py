@@ -60,7 +60,7 @@ class RecordFolder:
         write_commissioning(self.folder, self.record)
 
     def report_change(self, name: str, when: datetime) -> None:
-        """Write that a person reported a change of a basis of `order.BASES`."""
+        """Write that a person reported a change of an input of `order.STEP_INPUTS`."""
         self.record = self.record.with_reported_change(name, when)
         write_commissioning(self.folder, self.record)
 

@@ -9,12 +9,12 @@ from experiments.commissioning.evidence.daily_record import COUNTS_FOR, read_his
 from experiments.commissioning.evidence.daily_record import FIELD as DAILY_FIELD
 from experiments.commissioning.evidence.inputs import current_inputs
 from experiments.commissioning.evidence.order import (
-    BASES,
     GATED,
     LONGEST_DAYS,
     ORDER,
+    STEP_INPUTS,
     StepId,
-    bases_of,
+    input_names_of,
 )
 from experiments.commissioning.evidence.record import Commissioning, read_commissioning
 from experiments.dates import is_ahead, is_fresh
@@ -85,14 +85,14 @@ def _cause(
     if done.verdict == "wrong":
         return done.cause or "failed"
     inputs = {**inputs, **record.reported_inputs()}
-    for name in bases_of(step):
+    for name in input_names_of(step):
         then, current = done.inputs.get(name), inputs.get(name)
-        if then is None and BASES[name].is_optional:
+        if then is None and STEP_INPUTS[name].is_optional:
             continue
         if current is not None and then != current:
             when = record.told.get(name)
             reported = "" if when is None else f" on {when:%Y-%m-%d}, as told"
-            return f"stale: {BASES[name].words} changed{reported}"
+            return f"stale: {STEP_INPUTS[name].words} changed{reported}"
     if now - done.ended > timedelta(days=LONGEST_DAYS):
         return f"stale: done more than {LONGEST_DAYS} days ago"
     if is_ahead(done.ended, now):
@@ -131,7 +131,7 @@ def check_commissioned(
         rig: a real rig, started, its loop not running.
         info: result of the start.
         add: receives the lines of the page.
-        made_anew: names of `order.BASES` that the command measures again.
+        made_anew: names of `order.STEP_INPUTS` that the command measures again.
         sensor: identity of the wrist sensor; None = not read.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Digests of the current inputs of the commissioning steps, by name in `order.BASES`.
+"""Digests of the current inputs of the steps, by name in `order.STEP_INPUTS`.
 
 A step whose inputs have changed since its record is stale.
 """
@@ -9,7 +9,7 @@ import platform
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from experiments.commissioning.evidence.order import StepId, bases_of
+from experiments.commissioning.evidence.order import StepId, input_names_of
 from experiments.rig.rig import Rig
 from experiments.settings.calibrations import PREFIX
 from wam.driver.startup import ArmInfo
@@ -80,7 +80,7 @@ def current_inputs(
 
 def inputs_of(step: StepId, current: Mapping[str, str]) -> dict[str, str]:
     """Return the current digests of the inputs of a step."""
-    return {name: current[name] for name in bases_of(step) if name in current}
+    return {name: current[name] for name in input_names_of(step) if name in current}
 
 
 def _properties(
@@ -90,7 +90,7 @@ def _properties(
 
 
 def _is_unknown(sensor: Mapping[str, str], name: str) -> bool:
-    """Return whether the sensor leaves a property unreported, always or at times."""
+    """Return whether the sensor does not report this property."""
     return sensor.get(name, "unknown").startswith("unknown")
 
 

@@ -43,8 +43,8 @@ def _from(first: StepId, last: StepId = StepId.PLATE) -> tuple[StepId, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class Basis:
-    """An input of steps.
+class StepInput:
+    """An input of commissioning steps.
 
     Attributes:
         words: description.
@@ -59,62 +59,64 @@ class Basis:
 
 
 _S = StepId
-BASES: dict[str, Basis] = {
-    "pucks": Basis(
+STEP_INPUTS: dict[str, StepInput] = {
+    "pucks": StepInput(
         "serial number, firmware, role, counts, slot or groups of a motor puck",
         (_S.IDENTITY, *_from(_S.BY_HAND)),
     ),
-    "motors": Basis(
+    "motors": StepInput(
         "torque units, poles or largest torque of a motor puck",
         (_S.IDENTITY, *_from(_S.REST_POSE, _S.LOCK_AND_CLOCK)),
     ),
-    "module": Basis(
+    "module": StepInput(
         "serial number, firmware or defaults of the safety module",
         (_S.IDENTITY, _S.STOP_CIRCUIT),
     ),
-    "zero": Basis(
+    "zero": StepInput(
         "zero position of the joints",
         (_S.BY_HAND, _S.OWN_WEIGHT, _S.HUNG_WEIGHT, _S.CONTAINER),
     ),
-    "[safety]": Basis(
+    "[safety]": StepInput(
         "[safety] of rig.toml", (_S.CONFIGURATION, _S.IDENTITY, _S.STOP_CIRCUIT)
     ),
-    "[limits]": Basis("[limits] of rig.toml", (_S.CONFIGURATION, _S.GRAVITY_RAMP)),
-    "[arm]": Basis("[arm] of rig.toml", (_S.CONFIGURATION, _S.BY_HAND)),
-    "[feet]": Basis(
+    "[limits]": StepInput("[limits] of rig.toml", (_S.CONFIGURATION, _S.GRAVITY_RAMP)),
+    "[arm]": StepInput("[arm] of rig.toml", (_S.CONFIGURATION, _S.BY_HAND)),
+    "[feet]": StepInput(
         "the foot of rig.toml or its calibration",
         (_S.OWN_WEIGHT, _S.HUNG_WEIGHT, *_from(_S.RAMPS, _S.GRAVITY_RAMP)),
     ),
-    "[ft_sensor]": Basis(
+    "[ft_sensor]": StepInput(
         "[ft_sensor] of rig.toml or its calibration",
         (_S.OWN_WEIGHT, _S.HUNG_WEIGHT, _S.LOCK_AND_CLOCK, _S.PLATE),
     ),
-    "sensor": Basis(
+    "sensor": StepInput(
         "kind, serial number or firmware of the wrist sensor",
         (_S.OWN_WEIGHT, _S.HUNG_WEIGHT, _S.LOCK_AND_CLOCK, _S.PLATE),
         is_optional=True,
     ),
-    "[gravity]": Basis(
+    "[gravity]": StepInput(
         "[gravity] of rig.toml or its calibration", (_S.LIFT, _S.GRAVITY_RAMP)
     ),
-    "[friction]": Basis(
+    "[friction]": StepInput(
         "[friction] of rig.toml or its calibration", (_S.LIFT, _S.GRAVITY_RAMP)
     ),
-    "[control]": Basis("[control] of rig.toml", (_S.GRAVITY_RAMP, _S.LOCK_AND_CLOCK)),
-    "[can]": Basis(
-        "[can] of rig.toml, the adapter or the kernel", (_S.LISTEN, _S.TIMING)
+    "[control]": StepInput(
+        "[control] of rig.toml", (_S.GRAVITY_RAMP, _S.LOCK_AND_CLOCK)
     ),
-    "terrain": Basis("row of the terrain or its calibration", (_S.CONTAINER,)),
-    "mounting": Basis("where the arm stands", ORDER),
-    "cables": Basis(
+    "[can]": StepInput(
+        "[can] of rig.toml, the adapter or the Linux kernel", (_S.LISTEN, _S.TIMING)
+    ),
+    "terrain": StepInput("row of the terrain or its calibration", (_S.CONTAINER,)),
+    "mounting": StepInput("where the arm stands", ORDER),
+    "cables": StepInput(
         "tension of the drive cables",
         _from(_S.BY_HAND, _S.GRAVITY_RAMP),
     ),
 }
-REPORTED_BASES = ("mounting", "cables")  # bases that only a person can report
+REPORTED_INPUTS = ("mounting", "cables")  # inputs that only a person can report
 LONGEST_DAYS = 30  # validity of a step
 
 
-def bases_of(step: StepId) -> list[str]:
+def input_names_of(step: StepId) -> list[str]:
     """Return the names of the inputs of a step."""
-    return [name for name, basis in BASES.items() if step in basis.steps]
+    return [name for name, given in STEP_INPUTS.items() if step in given.steps]

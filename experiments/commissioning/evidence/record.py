@@ -95,7 +95,7 @@ class StepRecord(RecordPart):
         started: UTC.
         ended: UTC.
         operator: name of the operator.
-        inputs: digests of its inputs, by the names of `order.BASES`.
+        inputs: digests of its inputs, by the names of `order.STEP_INPUTS`.
         raw: its recordings.
         quantities: its results.
         verdict: "wrong" = a quantity is beyond its limits.
@@ -137,7 +137,7 @@ class Commissioning(RecordPart):
         program: version of the program that wrote it.
         is_simulated: whether the arm is simulated.
         steps: records of the steps.
-        told: time [UTC] at which a person last reported a change of a basis, by name.
+        told: time [UTC] at which a person last reported a change of an input, by name.
     """
 
     version: Literal["1.0"] = FORMAT
@@ -175,12 +175,12 @@ class Commissioning(RecordPart):
         return self.model_copy(update={"steps": chained})
 
     def with_reported_change(self, name: str, when: datetime) -> Self:
-        """Return the commissioning with a reported change of a basis, chained again."""
+        """Return the commissioning with a reported change, chained again."""
         told = {**self.told, name: when}
         return self.model_copy(update={"told": told, "steps": _chain(self.steps, told)})
 
     def reported_inputs(self) -> dict[str, str]:
-        """Digests of the reported changes, by the names of `order.BASES`."""
+        """Digests of the reported changes, by the names of `order.STEP_INPUTS`."""
         return {name: _initial_digest({name: when}) for name, when in self.told.items()}
 
     def first_broken(self) -> StepId | None:

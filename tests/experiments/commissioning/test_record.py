@@ -6,12 +6,12 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from acquisition.errors import PreflightError, SettingsError
-from experiments.commissioning.evidence.gate import bases_of, lacks, require
+from experiments.commissioning.evidence.gate import input_names_of, lacks, require
 from experiments.commissioning.evidence.order import (
-    BASES,
     GATED,
     ORDER,
-    REPORTED_BASES,
+    REPORTED_INPUTS,
+    STEP_INPUTS,
     StepId,
 )
 from experiments.commissioning.evidence.record import (
@@ -24,7 +24,7 @@ from experiments.commissioning.evidence.record import (
 )
 
 NOON = datetime(2026, 11, 26, 12, tzinfo=UTC)
-INPUTS = {name: f"{number:064x}" for number, name in enumerate(BASES)}
+INPUTS = {name: f"{number:064x}" for number, name in enumerate(STEP_INPUTS)}
 
 
 def done(step, **changed):
@@ -33,7 +33,7 @@ def done(step, **changed):
         "started": NOON,
         "ended": NOON + timedelta(minutes=5),
         "operator": "one",
-        "inputs": {name: INPUTS[name] for name in bases_of(step)},
+        "inputs": {name: INPUTS[name] for name in input_names_of(step)},
         "quantities": (Measured(name="travel", value=1.25, unit="%", high=1.7),),
         "verdict": "sound",
     }
@@ -137,11 +137,13 @@ def test_without_a_record_every_step_is_missing_and_the_first_is_reported():
         require(lacking)
 
 
-@pytest.mark.parametrize("name", BASES)
+@pytest.mark.parametrize("name", STEP_INPUTS)
 def test_a_changed_input_makes_its_steps_stale_and_no_others(name):
     lacking = lacks(whole(), {**INPUTS, name: "f" * 64}, NOON)
-    assert tuple(lack.step for lack in lacking) == BASES[name].steps
-    assert all(f"stale: {BASES[name].words} changed" in lack.text for lack in lacking)
+    assert tuple(lack.step for lack in lacking) == STEP_INPUTS[name].steps
+    assert all(
+        f"stale: {STEP_INPUTS[name].words} changed" in lack.text for lack in lacking
+    )
 
 
 def test_an_unknown_input_makes_no_step_stale():
@@ -149,15 +151,15 @@ def test_an_unknown_input_makes_no_step_stale():
     assert lacks(whole(), present, NOON) == []
 
 
-@pytest.mark.parametrize("name", REPORTED_BASES)
+@pytest.mark.parametrize("name", REPORTED_INPUTS)
 def test_a_reported_change_makes_its_steps_stale_until_they_are_repeated(name):
     record = whole().with_reported_change(name, NOON + timedelta(hours=1))
     lacking = lacks(record, INPUTS, NOON + timedelta(hours=2))
-    assert tuple(lack.step for lack in lacking) == BASES[name].steps
+    assert tuple(lack.step for lack in lacking) == STEP_INPUTS[name].steps
     assert "changed on 2026-11-26, as told" in lacking[0].text
     present = {**INPUTS, **record.reported_inputs()}
-    for step in BASES[name].steps:
-        inputs = {basis: present[basis] for basis in bases_of(step)}
+    for step in STEP_INPUTS[name].steps:
+        inputs = {key: present[key] for key in input_names_of(step)}
         record = record.with_step(done(step, inputs=inputs))
     assert lacks(record, INPUTS, NOON) == []
 
@@ -224,7 +226,7 @@ def test_every_terrain_keeps_its_own_container():
     second = done(
         StepId.CONTAINER,
         subject="S10",
-        inputs={name: other[name] for name in bases_of(StepId.CONTAINER)},
+        inputs={name: other[name] for name in input_names_of(StepId.CONTAINER)},
     )
     record = whole(*ORDER[:-2]).with_step(second).with_step(first)
     record = record.with_step(done(StepId.PLATE))

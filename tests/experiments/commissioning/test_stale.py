@@ -10,7 +10,7 @@ import pytest
 
 from experiments.commissioning.evidence.gate import lacks
 from experiments.commissioning.evidence.inputs import current_inputs
-from experiments.commissioning.evidence.order import BASES, ORDER, REPORTED_BASES
+from experiments.commissioning.evidence.order import ORDER, REPORTED_INPUTS, STEP_INPUTS
 from experiments.preflight.connecting import connect_rig
 from experiments.rig.requests import LastAnswers, OpenSensor, StartArm
 from experiments.rig.rig import FakeOptions
@@ -20,7 +20,7 @@ from lab.guest.commissioned import record_of
 from tests.experiments.commissioning.test_record import NOON
 from tests.experiments.program import changed, write_config
 
-SETTINGS = {  # name of the basis: file, old text, new text
+SETTINGS = {  # name of the input: file, old text, new text
     "[safety]": ("rig.toml", "speed_fault = 1.0", "speed_fault = 0.9"),
     "[limits]": ("rig.toml", "foot_speed = 0.8 ", "foot_speed = 0.7 "),
     "[arm]": ("rig.toml", "[arm]\n", "[arm]\nrest = [0, -2, 0, 3, 0, 0, 0]\n"),
@@ -83,7 +83,7 @@ def test_a_changed_section_makes_its_steps_stale(sound, tmp_path, name):
     path = tmp_path / file
     path.write_text(changed(path.read_text(), old, new))
     present = current_inputs(*connected(tmp_path))
-    assert stale(sound, present) == BASES[name].steps
+    assert stale(sound, present) == STEP_INPUTS[name].steps
 
 
 @pytest.mark.parametrize("joint", [1, 7])
@@ -93,8 +93,11 @@ def test_a_changed_puck_property_makes_its_steps_stale(sound, joint, name):
     other = [dict(answer) for answer in answers]
     assert other[joint - 1][name] is not None
     other[joint - 1][name] += 1
-    basis = "pucks" if name in PUCK else "motors"
-    assert stale(sound, current_inputs(rig, other, info, sensor)) == BASES[basis].steps
+    changed = "pucks" if name in PUCK else "motors"
+    assert (
+        stale(sound, current_inputs(rig, other, info, sensor))
+        == STEP_INPUTS[changed].steps
+    )
 
 
 @pytest.mark.parametrize(
@@ -118,7 +121,7 @@ def test_another_safety_module_or_other_limits_make_its_steps_stale(sound, chang
     assert info.safety_defaults == (2048, 4096, 4731, 5204)
     other = replace(info, **change(info))
     present = current_inputs(rig, answers, other, sensor)
-    assert stale(sound, present) == BASES["module"].steps
+    assert stale(sound, present) == STEP_INPUTS["module"].steps
 
 
 def test_a_module_without_a_serial_number_makes_no_step_stale(sound):
@@ -137,7 +140,7 @@ def test_another_wrist_sensor_makes_its_steps_stale(sound, name):
     before = commissioned(current_inputs(rig, answers, info, full))
     other = current_inputs(rig, answers, info, {**full, name: f"{full[name]}1"})
     lacking = [lack.step for lack in lacks(before, other, NOON)]
-    assert tuple(lacking) == BASES["sensor"].steps
+    assert tuple(lacking) == STEP_INPUTS["sensor"].steps
 
 
 def test_a_sensor_of_unknown_identity_makes_no_step_stale(sound):
@@ -151,8 +154,8 @@ def test_a_sensor_of_unknown_identity_makes_no_step_stale(sound):
 
 def test_every_basis_is_changed_by_a_test():
     # Changes reported by persons: tests/experiments/commissioning/test_record.py.
-    assert {*SETTINGS, *REPORTED_BASES, "pucks", "motors", "module", "sensor"} == set(
-        BASES
+    assert {*SETTINGS, *REPORTED_INPUTS, "pucks", "motors", "module", "sensor"} == set(
+        STEP_INPUTS
     )
 
 
@@ -168,4 +171,4 @@ def test_a_container_measured_again_makes_its_steps_stale(sound):
     before = commissioned(current_inputs(measured("incline = 0.1"), answers, info))
     again = current_inputs(measured("incline = 0.2"), answers, info)
     lacking = [lack.step for lack in lacks(before, again, NOON)]
-    assert tuple(lacking) == BASES["terrain"].steps
+    assert tuple(lacking) == STEP_INPUTS["terrain"].steps
