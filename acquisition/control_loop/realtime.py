@@ -40,7 +40,7 @@ class RealtimeRequest:
 
 
 @dataclass(frozen=True, slots=True)
-class Grant:
+class GrantResult:
     """Result of one request: name, whether granted, reason for a refusal."""
 
     what: str
@@ -60,9 +60,9 @@ def choose_cores() -> tuple[int | None, int | None]:
     return (cores[-1], cores[0]) if len(cores) > 1 else (None, None)
 
 
-def request(wanted: RealtimeRequest) -> list[Grant]:
+def request(wanted: RealtimeRequest) -> list[GrantResult]:
     """Apply the settings `wanted`; refusals are part of the result."""
-    grants: list[Grant] = []
+    grants: list[GrantResult] = []
     if wanted.core is not None:
         core = wanted.core
         grants.append(_try(f"core {core}", lambda: os.sched_setaffinity(0, {core})))
@@ -119,11 +119,11 @@ def _stay_awake() -> None:
     os.write(os.open(_LATENCY, os.O_WRONLY), _NO_SLEEP)
 
 
-def _try(what: str, call: Callable[[], object]) -> Grant:
+def _try(what: str, call: Callable[[], object]) -> GrantResult:
     try:
         call()
     except OSError as error:
         name = errno.errorcode.get(error.errno or 0, "error")
         needs = f"; needs {_NEEDS[what]}" if what in _NEEDS else ""
-        return Grant(what, is_granted=False, reason=f"{name}{needs}")
-    return Grant(what, is_granted=True)
+        return GrantResult(what, is_granted=False, reason=f"{name}{needs}")
+    return GrantResult(what, is_granted=True)

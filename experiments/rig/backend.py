@@ -6,7 +6,7 @@ from typing import Protocol
 
 from acquisition.clock import Clock
 from acquisition.control_loop.loop import Loop
-from acquisition.control_loop.realtime import Grant
+from acquisition.control_loop.realtime import GrantResult
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
 from acquisition.ipc.layout import SharedLayout
@@ -38,7 +38,7 @@ class RigBackend(Protocol):
     def ask(self, request: Request[Answer]) -> Answer:
         """Send a request of `experiments.rig.requests` to arm or sensor.
 
-        Allowed only while the loop is stopped; raises the errors of the request.
+        Allowed only while the loop is stopped; raises what the request raises.
         """
         ...
 
@@ -50,7 +50,7 @@ class RigBackend(Protocol):
         """Start the loop."""
         ...
 
-    def grants(self) -> dict[str, list[Grant]]:
+    def grants(self) -> dict[str, list[GrantResult]]:
         """Return the scheduling rights granted to each process."""
         ...
 
@@ -131,15 +131,15 @@ class InProcessBackend:
         self._advance_loop = InlineLoop(loop, self.recorder)
         self.loop_client.beat()
 
-    def grants(self) -> dict[str, list[Grant]]:
+    def grants(self) -> dict[str, list[GrantResult]]:
         """Return no grants: this thread requests none."""
         return {}
 
     def idle(self) -> bool:
         """Idle the arm; returns whether that is confirmed.
 
-        A running loop idles the arm itself: an arm idled by others looks to it like a
-        press of the pendant.
+        A running loop idles the arm itself: if anything else idled the arm, the loop
+        would take it for a press of the pendant.
         """
         if self._advance_loop is not None:
             with suppress(Exception):  # the loop failed: idle the arm directly

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from acquisition.clock import PERIOD_NS, Clock
-from acquisition.control_loop.realtime import Grant, choose_cores
+from acquisition.control_loop.realtime import GrantResult, choose_cores
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
 from acquisition.errors import LinkError, PreflightError, TractionError
@@ -132,9 +132,9 @@ class MultiProcessBackend:
         self.loop_client.beat()
         self._control.ask(BeginLoop())
 
-    def grants(self) -> dict[str, list[Grant]]:
+    def grants(self) -> dict[str, list[GrantResult]]:
         """Return the scheduling rights granted to each process."""
-        grants: dict[str, list[Grant]] = {}
+        grants: dict[str, list[GrantResult]] = {}
         if not self.loop_client.loop.is_running:
             grants[_CONTROL] = self._control.ask(AskGrants())
         if self._reader is not None:

@@ -5,7 +5,7 @@
 
 from dataclasses import dataclass
 
-from acquisition.control_loop.realtime import Grant
+from acquisition.control_loop.realtime import GrantResult
 from acquisition.devices import SafetyMode
 from acquisition.ipc.requests import Request
 from wam.driver.startup import ArmInfo
@@ -116,5 +116,5 @@ class AskSafetyMode(Request[SafetyMode]):
 
 
 @dataclass(frozen=True, slots=True)
-class AskGrants(Request[list[Grant]]):
+class AskGrants(Request[list[GrantResult]]):
     """Scheduling rights granted to this process."""

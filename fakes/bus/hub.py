@@ -231,7 +231,7 @@ class CanPort:
             arrived = self._transport.receive()
         except LinkError as error:
             raise LinkError(
-                f"CAN {self.name} broke: {error.message}",
+                f"CAN {self.name} failed: {error.message}",
                 hint="Check it, then serve again.",
             ) from error
         for can_id, data, _ in arrived:

@@ -100,7 +100,7 @@ _COMMANDED = frozenset(
 MODE_BROADCAST_ID = compose_id(SAFETY_NODE, Group.BUS, is_group=True)
 
 
-def is_of_host(can_id: int) -> bool:
+def is_host_id(can_id: int) -> bool:
     """Return whether only a host sends frames with this 11-bit identifier.
 
     Devices accept a frame with any sender field, and they send to feedback groups only,

@@ -9,17 +9,17 @@ from typing import NamedTuple, Protocol
 from acquisition.clock import NS_PER_S
 from acquisition.errors import LinkError, LinkFullError
 from wam.bus.error_frames import ERROR_FLAG, BusErrors
-from wam.bus.frames import MODE_BROADCAST_ID, is_of_host
+from wam.bus.frames import MODE_BROADCAST_ID, is_host_id
 
-_FULL = frozenset({errno.ENOBUFS, errno.EAGAIN})  # a queue, a socket's buffer
+_FULL = frozenset({errno.ENOBUFS, errno.EAGAIN})  # send queue full, socket buffer full
 MAX_DRAINED_FRAMES = 512  # frames; bounds the time of a cycle when the bus is flooded
-_PLAUSIBLE_NS = 10 * NS_PER_S  # an older timestamp is of another clock
+_PLAUSIBLE_NS = 10 * NS_PER_S  # an older timestamp comes from another clock
 _AHEAD_NS = 5_000_000  # frames keep arriving while the bus is drained
 _LARGEST_ID = 0x7FF  # 11-bit identifiers; the WAM uses no others
-_OF_DEVICES = frozenset(
+_DEVICE_IDS = frozenset(
     can_id
     for can_id in range(_LARGEST_ID + 1)
-    if not is_of_host(can_id) and can_id != MODE_BROADCAST_ID
+    if not is_host_id(can_id) and can_id != MODE_BROADCAST_ID
 )
 _can_id = itemgetter(0)
 
@@ -28,8 +28,8 @@ class Frame(NamedTuple):
     """A frame as received or sent.
 
     Attributes:
-        can_id: 11-bit identifier; a transport adds Linux's flag of an error, extended
-            or remote frame.
+        can_id: 11-bit identifier; transports OR in Linux's flags for error, extended
+            and remote frames.
         data: payload.
         t_ns: time on the bus by the host's monotonic clock [ns], 0 = not known.
     """
@@ -47,7 +47,7 @@ class Transport(Protocol):
     """Adapter interface of a link: sends and receives frames of all kinds.
 
     Attributes:
-        name: name for people.
+        name: human-readable name.
         lost: received frames dropped for lack of buffer space, if the adapter counts.
     """
 
@@ -134,7 +134,7 @@ class Link(Protocol):
 class CanLink:
     """Non-blocking CAN link that passes device frames to the driver.
 
-    Frames of hosts (`is_of_host`), remote, extended and error frames are dropped. The
+    Frames of hosts (`is_host_id`), remote, extended and error frames are dropped. The
     content of the safety module's mode broadcast is undocumented: it is counted in
     `mode_hints` and dropped. A bus does not echo frames sent through it, so a received
     host frame is another master's.
@@ -229,10 +229,10 @@ class CanLink:
 
     def _sort(self, arrived: list[Frame]) -> None:
         """Pass 11-bit data frames to the tap and keep those of devices."""
-        if _OF_DEVICES.issuperset(map(_can_id, arrived)):
+        if _DEVICE_IDS.issuperset(map(_can_id, arrived)):
             self._inbox += arrived
         else:
-            self._inbox += [frame for frame in arrived if frame[0] in _OF_DEVICES]
+            self._inbox += [frame for frame in arrived if frame[0] in _DEVICE_IDS]
             self._note_others(arrived)
             arrived = [frame for frame in arrived if frame[0] <= _LARGEST_ID]
         if self._tap is not None and arrived:
@@ -247,7 +247,7 @@ class CanLink:
                     self.errors.add(can_id, frame[1])
             elif can_id == MODE_BROADCAST_ID:
                 self.mode_hints += 1
-            elif can_id not in _OF_DEVICES:
+            elif can_id not in _DEVICE_IDS:
                 self.foreign_ids.add(can_id)
                 if self.foreign_id is None:
                     self.foreign_id = can_id
@@ -271,7 +271,7 @@ def link_error(channel: str, error: Exception) -> LinkError:
             hint="No device acknowledges: is the arm powered, is the bus terminated?",
         )
     return LinkError(
-        f"CAN {channel} broke: {error}.",
+        f"CAN {channel} failed: {error}.",
         hint="Check the adapter and its cable, then start again.",
     )
 

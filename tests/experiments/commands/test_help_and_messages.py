@@ -526,7 +526,7 @@ def _no_end_tare(scene):
 
 CASES = {
     # found by a preflight
-    "can-down": fault("can-down", 3, words="broke: Network is down"),
+    "can-down": fault("can-down", 3, words="failed: Network is down"),
     "puck-missing": fault("puck-missing", 3, words="Puck 5 does not answer (1,2,3,4,6"),
     "not-zeroed": fault("not-zeroed", 3),
     "ft-silent": fault("ft-silent", 3, words="No F/T data for 100 ms (port open, 0"),

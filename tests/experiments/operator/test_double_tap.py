@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from acquisition.trial_file.reader import TrialReader
-from experiments.operator.foot_gesture import RELEASED, DoubleTap
+from experiments.operator.foot_gesture import RELEASE_FORCE, DoubleTap
 from experiments.operator.prompts import Prompt
 from tests.experiments.program import journal, run_watched, write_config
 
@@ -55,8 +55,8 @@ def test_a_press_needs_a_minimum_force():
 
 def test_the_foot_must_be_released_between_two_presses():
     presses = [(0.5, 0.1), (0.9, 0.1)]
-    assert not is_tap(*pressed(*presses, rest=RELEASED + 0.1))
-    assert is_tap(*pressed(*presses, rest=RELEASED - 0.1))
+    assert not is_tap(*pressed(*presses, rest=RELEASE_FORCE + 0.1))
+    assert is_tap(*pressed(*presses, rest=RELEASE_FORCE - 0.1))
 
 
 def test_a_sliding_foot_is_no_double_tap():

@@ -316,18 +316,18 @@ def test_identifiers_have_eleven_bits(can_id):
 @pytest.mark.parametrize("to", [*range(1, 9), 10])
 def test_a_frame_to_a_device_is_from_a_host_whatever_its_sender_field(to):
     for sender in range(32):
-        assert frames.is_of_host(frames.compose_id(sender, to, is_group=False))
+        assert frames.is_host_id(frames.compose_id(sender, to, is_group=False))
 
 
 @pytest.mark.parametrize("group", [0, 1, 2, 4, 5])
 def test_a_group_command_is_from_a_host_whatever_its_sender_field(group):
     for sender in (0, 1, 7, 8, 20, 31):
-        assert frames.is_of_host(frames.compose_id(sender, group, is_group=True))
+        assert frames.is_host_id(frames.compose_id(sender, group, is_group=True))
 
 
 @pytest.mark.parametrize("sender", [8, 9, 10, 20, 31])
 def test_a_position_from_a_node_that_is_not_a_motor_is_from_a_host(sender):
-    assert frames.is_of_host(frames.compose_id(sender, 3, is_group=True))
+    assert frames.is_host_id(frames.compose_id(sender, 3, is_group=True))
 
 
 def test_frames_of_devices_are_not_attributed_to_a_host():
@@ -335,4 +335,4 @@ def test_frames_of_devices_are_not_attributed_to_a_host():
     hand = [frames.position_reply_id(11), frames.property_reply_id(14)]
     # A foreign node may be queried; the safety module broadcasts its mode.
     others = [frames.property_reply_id(20), frames.MODE_BROADCAST_ID]
-    assert not any(map(frames.is_of_host, [*replies, *hand, *others]))
+    assert not any(map(frames.is_host_id, [*replies, *hand, *others]))
