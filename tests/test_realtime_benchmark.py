@@ -1,4 +1,4 @@
-"""The benchmark of the loop has settings that a rig can be built from."""
+"""A rig can be built from the settings of the loop benchmark."""
 
 from benchmarks.realtime import settings_with_bus_sensor
 from experiments.settings.calibrations import with_calibrations

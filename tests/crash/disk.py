@@ -19,7 +19,7 @@ from tests.crash.syscalls import (
     Write,
 )
 
-FOLDER = 0  # takes the place of a file number
+FOLDER = 0  # used in place of a file number
 OUTCOMES = ("none", "all", "first", "torn", "some", "zeros")
 
 
@@ -44,7 +44,7 @@ class Disk:
         }
 
     def folders(self) -> list[Path]:
-        """Return the folders reachable from the root, outer ones first."""
+        """Return the folders reachable from the root, parents first."""
         names = [path for path, number in self.names.items() if number == FOLDER]
         return sorted(path for path in names if self._is_reachable(path))
 
@@ -110,7 +110,7 @@ def _by_object(operations: Sequence[Operation]) -> dict[int | Path, list[int]]:
 
 
 def _synced(operations: Sequence[Operation]) -> set[int]:
-    """Return the indices of all operations that a later one synced to the disk."""
+    """Return the indices of all operations that a later fsync made durable."""
     synced: set[int] = set()
     waiting: dict[int | Path, list[int]] = {}
     for i, operation in enumerate(operations):

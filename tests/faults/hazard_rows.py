@@ -181,7 +181,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "before the first torque",
             (
-                "tests/wam/driver/test_safety_limits.py::test_a_module_that_keeps_its_limit_is_driven_with_both_values_reported",
+                "tests/wam/driver/test_safety_limits.py::test_a_limit_the_module_refuses_is_reported_with_both_values",
             ),
         ),
         "implausible": (

@@ -1,4 +1,4 @@
-"""The timer of a known kernel is corrected through QEMU's gdb stub, no other one."""
+"""Only the timer of a known kernel is corrected, through QEMU's gdb stub."""
 
 import socket
 import struct
@@ -14,7 +14,7 @@ FACTOR, LONGEST = 268_434_382, 34_359_875_825
 
 
 class Stub:
-    """A gdb stub with a little memory, whose machine stops at the connection."""
+    """A gdb stub with a few bytes of memory, halted when the debugger connects."""
 
     def __init__(self, path, factor=FACTOR, shift=32):
         self.memory = {OFFSETS: struct.pack("<Q", AREA)}

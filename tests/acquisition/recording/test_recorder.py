@@ -185,11 +185,11 @@ def test_a_long_wait_before_the_trigger_is_not_a_loss(bench):
 
 
 def test_raw_frames_are_recorded_when_the_header_asks(bench):
-    tape = FrameRing(bench.shared.frames, bench.clock)
+    ring = FrameRing(bench.shared.frames, bench.clock)
     now_ns = bench.clock.now_ns()
-    tape.add([(1, b"", now_ns - 1001 * MS)])
+    ring.add([(1, b"", now_ns - 1001 * MS)])
     bench.recorder.start(bench.path, replace(make_header(), has_frames=True))
-    tape.add([(0x404, b"\x30", 0)])
+    ring.add([(0x404, b"\x30", 0)])
     bench.run(5)
     bench.recorder.finish("end")
     ((_, payload),) = messages_of(bench.path)["/can/raw"]
@@ -263,7 +263,7 @@ def test_a_file_that_cannot_be_opened_leaves_the_recorder_idle(bench):
     assert not bench.recorder.is_recording
 
 
-def test_stopping_without_a_trial_is_an_error_of_the_program(bench):
+def test_stopping_without_a_trial_raises_a_runtime_error(bench):
     with pytest.raises(RuntimeError):
         bench.recorder.finish("end")
 

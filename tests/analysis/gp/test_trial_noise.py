@@ -1,4 +1,4 @@
-"""The trial effect against finite differences, a closed form and scikit-learn."""
+"""The trial effect agrees with finite differences, a closed form and scikit-learn."""
 
 import numpy as np
 import pytest

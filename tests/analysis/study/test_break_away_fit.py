@@ -27,7 +27,7 @@ def fitted(stones):
     return fit_break_away(stones, KINDS, FEW)
 
 
-def plate(trials, ratio=0.4, seed=0, slope=0.0):
+def plate(trials, ratio=0.4, seed=0, extra_speed=0.0):
     """Return trials of slow sliding, each with an offset of its force."""
     rng = np.random.default_rng(seed)
     t = 0.002 * np.arange(3000)
@@ -35,7 +35,7 @@ def plate(trials, ratio=0.4, seed=0, slope=0.0):
     for k in range(trials):
         F_n = 4.0 + np.sin(t + k)
         F_t = ratio * F_n + 0.2 * rng.normal() + 0.1 * rng.normal(size=t.size)
-        v_t = 0.0125 + 0.005 * np.sin(3 * t) + slope
+        v_t = 0.0125 + 0.005 * np.sin(3 * t) + extra_speed
         series = TractionSeries("TF", f"TF-{k}", t, v_t, F_n, F_t)
         made.append(prepare_trial(series, PrepareOptions(smoothing=1)))
     return made
@@ -75,13 +75,13 @@ def test_counts_and_v_slip_are_stored(stones, fitted):
     assert fast["S0"].v_slip == 0.14
 
 
-def test_fewer_than_three_trials_give_no_answer(stones):
+def test_fewer_than_three_trials_are_not_modelled(stones):
     two = {name: trials[:2] for name, trials in stones.items()}
     assert fit_break_away(two, KINDS, FEW) == {}
     assert fit_break_away({"TF": plate(2)}, KINDS, FEW) == {}
 
 
-def test_a_plate_with_few_slips_answers_for_sliding():
+def test_a_plate_with_few_slips_is_modelled_as_sliding():
     known = fit_break_away({"TF": plate(6)}, KINDS, FEW)["TF"]
     assert known.kind == SLIDING
     assert known.slips == 0
@@ -100,8 +100,8 @@ def test_a_plate_with_enough_slips_has_its_own_model():
     assert known.law.spread == pytest.approx(0.1, abs=0.04)
 
 
-def test_a_plate_that_only_moves_fast_has_no_answer():
-    fast = plate(4, slope=0.05)
+def test_a_plate_that_only_moves_fast_is_not_modelled():
+    fast = plate(4, extra_speed=0.05)
     assert fit_break_away({"TF": fast}, KINDS, FEW) == {}
 
 

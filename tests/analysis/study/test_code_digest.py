@@ -1,4 +1,4 @@
-"""A corrected formula never shows an old number: results are keyed by their code."""
+"""A corrected formula never returns a stale result: results are keyed by their code."""
 
 import shutil
 import subprocess
@@ -124,9 +124,9 @@ def test_a_corrected_formula_is_refitted(copy, tmp_path):
     assert first == len(errors) > 1
     assert fitted() == (1, errors)  # one progress call: all are stored
     path = copy / "analysis" / "tustin" / "model.py"
-    formula, right = path.read_text(), "stribeck_power(np.abs(v_t), p.v_s,"
-    assert right in formula
-    path.write_text(formula.replace(right, "stribeck_power(np.abs(v_t), 2 * p.v_s,"))
+    formula, correct = path.read_text(), "stribeck_power(np.abs(v_t), p.v_s,"
+    assert correct in formula
+    path.write_text(formula.replace(correct, "stribeck_power(np.abs(v_t), 2 * p.v_s,"))
     again, others = fitted()
     assert again == first
     assert others != errors

@@ -1,4 +1,4 @@
-"""The gain by a further column is recovered on simulated ground."""
+"""The gain from an additional column is recovered on simulated ground."""
 
 from dataclasses import replace
 
@@ -30,7 +30,7 @@ def slow(rng, size, count=6):
 
 
 def trials_of(count=6, size=4000):
-    """Return trials of a wet ground: F_t grows with moisture and pushes the tilt."""
+    """Return trials of a wet ground: F_t grows with moisture and causes the tilt."""
     trials = []
     for k in range(count):
         rng = np.random.default_rng(k)

@@ -52,21 +52,21 @@ def rows(page):
 
 
 def frames():
-    """(frame, words) of every row that shows a frame, in order."""
+    """(frame, text) of every row that shows a frame, in order."""
     for cells in rows(PAGE):
-        for frame, words in pairwise(cells):
+        for frame, text in pairwise(cells):
             if re.fullmatch(r"`[0-9A-F]+#[0-9A-F]*`", frame):
-                yield frame.strip("`"), words
+                yield frame.strip("`"), text
 
 
-def test_every_frame_decodes_to_its_words():
+def test_every_frame_decodes_to_its_text():
     reader = BusReader()
     raw = []
     for number, (frame, _) in enumerate(frames()):
         (logged,) = parse_log([f"({1e-4 * number:.6f}) can0 {frame}"], print)
         raw.append(reader.read(logged)[-1].text)
     texts = [re.sub(r", (LATE: )?\d+ us after the request$", "", text) for text in raw]
-    assert texts == [words for _, words in frames()]
+    assert texts == [text for _, text in frames()]
     assert len(texts) > 30
 
 
@@ -113,7 +113,7 @@ def test_the_command_that_sets_up_an_interface_is_the_same_everywhere():
 
 
 def refusal(options=None, silent=()):
-    """Message with which the start refuses an arm."""
+    """Message with which start-up refuses an arm."""
     rig = Rig(options)
     for node in silent:
         rig.network.silence(node)
@@ -131,7 +131,7 @@ REFUSALS = {
 
 
 @pytest.mark.parametrize("what", REFUSALS)
-def test_every_refusal_of_the_start_is_quoted(what):
+def test_every_start_up_refusal_is_quoted(what):
     assert f"`{refusal(*REFUSALS[what])}`" in PAGE
 
 

@@ -1,4 +1,4 @@
-"""Lines for people: broken between words where there is a terminal."""
+"""On a terminal, console lines wrap between words."""
 
 import pytest
 from hypothesis import given

@@ -1,4 +1,4 @@
-"""The conditions of a session, also of a session older than some settings."""
+"""Session conditions, also of sessions recorded before some settings existed."""
 
 import io
 from contextlib import redirect_stdout
@@ -73,15 +73,15 @@ def test_a_missing_setting_without_a_default_is_a_difference(folder):
 
 
 def test_a_setting_that_no_longer_exists_is_ignored(folder):
-    write_conditions(folder, {**NOW, "rig.limits.of_old": "3"})
+    write_conditions(folder, {**NOW, "rig.limits.obsolete": "3"})
     assert check(folder, NOW) == []
 
 
-def test_settings_of_the_operator_are_no_conditions():
+def test_settings_of_the_operator_are_not_conditions():
     assert not [name for name in DEFAULTS if name.startswith("rig.operator.")]
 
 
-def test_defaults_of_the_sensor_in_use_are_no_differences():
+def test_defaults_of_the_sensor_in_use_are_not_differences():
     assert default_conditions("bota")["rig.ft_sensor.calibration"] == "None"
     now = {"rig.ft_sensor.kind": "bota", "rig.ft_sensor.calibration": "None"}
     assert differences({"rig.ft_sensor.kind": "bota"}, now) == []

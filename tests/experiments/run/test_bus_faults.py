@@ -25,8 +25,6 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 AFTER = 0.2  # s into the recording
 ALL_FRESH = 0x7F << MOTOR_FRESH_SHIFT
 
-# name: (start of the message, state of the arm in it, last line printed,
-#        true mode at the end)
 BRAKED, UNKNOWN = (
     "ARM: idle; it sinks slowly, support it.",
     "ARM: UNKNOWN - support it.",
@@ -36,6 +34,8 @@ NO_POWER = "ARM: stopped by its hardware, without power; it sinks, support it."
 IDLE, E_STOP = SafetyMode.IDLE, SafetyMode.E_STOP
 HELD = "ARM: held by its last torques, going idle - support it."
 MODULE = "The safety module put the arm to idle: "
+# name: (start of the message, state of the arm in it, last line printed,
+#        true mode at the end)
 ENDINGS = {
     "puck-silent": ("Puck 3 has not answered for ", HELD, BRAKED, IDLE),
     "puck-reboot": ("Puck 3 has not answered for ", HELD, BRAKED, IDLE),
@@ -204,8 +204,8 @@ def test_incomplete_cycles_are_rare_isolated_and_flagged(endured):
     begun = int(np.argmax(lacking))  # 0 where none is lacking
     assert lacking[begun:].mean() == pytest.approx(late, abs=0.001)
     assert not (lacking[1:] & lacking[:-1]).any()
-    # The push is smooth to four counts of joint 4, 3.4e-4 rad, which moves 5e-4 in
-    # a cycle; a stale position would show twice that.
+    # Second differences of a clean push stay below four counts of joint 4 (3.4e-4
+    # rad). Joint 4 moves 5e-4 rad per cycle: a stale position would show 1e-3.
     kinks = np.abs(np.diff(cycles["position"], n=2, axis=0))
     assert kinks.max() < 5e-4
 

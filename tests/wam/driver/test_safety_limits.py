@@ -76,7 +76,7 @@ def test_limits_left_by_another_program_are_reset():
     assert [f.data.hex(" ") for f in rig.link.receive()] == ["ae 00 00 10"]
 
 
-def test_a_module_that_keeps_its_limit_is_driven_with_both_values_reported():
+def test_a_limit_the_module_refuses_is_reported_with_both_values():
     rig = Rig()
     receive = rig.network.receive
     set_vl2 = encode_set(46, 6144)
@@ -88,7 +88,7 @@ def test_a_module_that_keeps_its_limit_is_driven_with_both_values_reported():
 
 
 @pytest.mark.parametrize(("name", "number"), [("VL1", 45), ("TL2", 48)])
-def test_an_unreadable_limit_is_driven_with_a_warning(name, number):
+def test_an_unreadable_limit_gives_a_warning(name, number):
     rig = Rig()
     receive = rig.network.receive
     rig.network.receive = lambda t, i, d: (

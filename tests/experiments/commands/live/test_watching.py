@@ -43,7 +43,7 @@ def folder(tmp_path):
 
 
 def written(shared, seed):
-    """Write a cycle with the present time; its record."""
+    """Write a cycle stamped with the current time; return its record."""
     record = filled(CYCLE, seed)
     record["host_ns"] = SystemClock().now_ns()
     shared.cycles.write(record.tobytes())
@@ -166,7 +166,7 @@ def test_a_viewer_sees_a_running_session(tmp_path, shared, folder, capsys):
 
 
 def _port(capsys, words="Layout"):
-    """Wait until the server has printed `words`; its port."""
+    """Wait until the server has printed `words`; return its port."""
     output, clock = "", SystemClock()
     while words not in output:
         clock.sleep_until(clock.now_ns() + 5_000_000)
