@@ -110,7 +110,8 @@ def create_file(folder: int, name: str, content: bytes, mode: int = 0o644) -> No
         mode: permissions before the umask.
 
     Raises:
-        OSError: the file exists, or the disk is full or gone; no partial file remains.
+        OSError: the file exists, or the disk is full or unavailable; no partial file
+            remains.
     """
     descriptor = os.open(name, _NEW, mode, dir_fd=folder)
     with removed_at_error(folder, name), os.fdopen(descriptor, "wb") as file:
@@ -125,7 +126,7 @@ def replace_file(folder: int, name: str, content: bytes, mode: int = 0o644) -> N
     Arguments as for `create_file`. A kill may leave a file .XXX.NAME.tmp.
 
     Raises:
-        OSError: the disk is full or gone; the old file remains.
+        OSError: the disk is full or unavailable; the old file remains.
     """
     temporary = f".{secrets.token_hex(4)}.{name}.tmp"
     create_file(folder, temporary, content, mode)
@@ -151,7 +152,7 @@ def publish_file(written: Path, path: Path) -> None:
     reorder the two, and a power cut in between would lose the file.
 
     Raises:
-        OSError: `path` exists, or the disk is full or gone.
+        OSError: `path` exists, or the disk is full or unavailable.
     """
     written.chmod(0o444)
     path.hardlink_to(written)

@@ -28,7 +28,7 @@ COMMANDS = {
     "run": "record a session of trials on one terrain",
     "resume": "continue an unfinished session",
     "redo": "record one trial of a session again",
-    "status": "count the kept trials per terrain from verified files",
+    "status": "verify the files and count the kept trials of each terrain",
     "note": "write a remark on a session or a trial",
     "verdict": "change the verdict on a recorded trial",
     "commission": "commission an arm in guided steps that each verify one property",
@@ -104,7 +104,7 @@ class _Parser(argparse.ArgumentParser):
         super().error(message)
 
     def print_help(self, file: "SupportsWrite[str] | None" = None) -> None:
-        """Print the help; output errors are not swallowed as in argparse."""
+        """Print the help; unlike argparse, let output errors propagate."""
         print(self.format_help(), end="", file=file)
         sys.stdout.flush()
 
@@ -166,7 +166,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def _signals_as_keyboard_interrupt() -> Generator[None]:
-    """Turn SIGTERM and SIGHUP into KeyboardInterrupt: a command closes its resources.
+    """Turn SIGTERM and SIGHUP into KeyboardInterrupt: commands close their resources.
 
     A session installs its own handlers.
     """
@@ -188,7 +188,7 @@ def _main(arguments: Sequence[str] | None) -> int:
         _complete()
     for name, value in openblas_settings().items():
         os.environ.setdefault(name, value)
-    if not _has_folder():
+    if not _has_working_directory():
         print(_NO_FOLDER, file=sys.stderr)  # noqa: T201
         return SettingsError.exit_code
     words = list(sys.argv[1:] if arguments is None else arguments)
@@ -219,7 +219,7 @@ def _main(arguments: Sequence[str] | None) -> int:
     return int(code)
 
 
-def _has_folder() -> bool:
+def _has_working_directory() -> bool:
     """Return whether the working directory exists and is readable."""
     try:
         Path.cwd()
@@ -229,7 +229,7 @@ def _has_folder() -> bool:
 
 
 def _report_output(error: OSError) -> int:
-    """Report an output error; a closed reader is no fault."""
+    """Report an output error; a closed pipe is not an error."""
     from experiments.operator.console import OutputError, discard
 
     discard(sys.stdout)

@@ -140,6 +140,6 @@ def _files(paths: Path | str | Iterable[Path | str]) -> list[Path]:
         if all(isinstance(path, str | Path) for path in items):
             return [Path(path) for path in items]
     raise SettingsError(
-        f"load_tables: {paths!r:.60} is no name of a file and no list of names.",
+        f"load_tables: {paths!r:.60} is neither a file name nor a list of file names.",
         hint='Write e.g. load_tables("a.csv") or load_tables(["a.csv", "b.csv"]).',
     )

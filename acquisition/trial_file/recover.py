@@ -88,7 +88,7 @@ class TrialCopy:
         """Append a record, in the order of the source.
 
         Raises:
-            OSError: the disk is full or gone.
+            OSError: the disk is full or unavailable.
         """
         match record:
             case Message():
@@ -112,7 +112,7 @@ class TrialCopy:
         """Write the metadata of the recovery and the summary.
 
         Raises:
-            OSError: the disk is full or gone.
+            OSError: the disk is full or unavailable.
         """
         is_elsewhere = not salvage.reason and self.details["reason"] == _SECTION
         self.details["is_doubtful"] = "true" if is_elsewhere else "false"

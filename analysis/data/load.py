@@ -1,4 +1,4 @@
-"""Loading of a trial file: joint positions and raw wrench, and derived quantities.
+"""Load a trial file; derive motion and forces from joint positions and raw wrench.
 
 The analysis starts again from joint positions and raw wrench with the calibration that
 the file carries, so a better calibration can be applied years later.
@@ -49,17 +49,18 @@ class RecordedTrial:
         t: time since the first cycle [s], shape (n,).
         sole: centre of the sole in the base frame [m], shape (n, 3).
         rotation: foot to base, z out of the arm, shape (n, 3, 3).
-        velocity: of the sole in the base frame [m/s], shape (n, 3); NaN next to gaps.
-        force: of the ground on the foot in the base frame [N], shape (n, 3).
+        velocity: velocity of the sole in the base frame [m/s], shape (n, 3); NaN next
+            to gaps.
+        force: force of the ground on the foot in the base frame [N], shape (n, 3).
         traction: v_t [m/s], F_t [N], F_n [N] in the terrain frame, shape (n, 3).
         lateral: force along y_T [N], shape (n,).
         frame: pose of the container.
         payload: applied calibration and tare.
         constants: applied arm model.
         sole_point: centre of the sole in the frame of the tool plate [m], shape (3,).
-        bracket: the tares before and after the trial; None where one is not known.
+        bracket: the tares before and after the trial; None if one is not known.
         sensor_height: height of the sensor's origin above the tool plate [m]; None
-            where the recorded settings do not give it.
+            if the recorded settings do not give it.
         friction_text: calibration of the arm's friction; empty if there was none.
     """
 
@@ -293,7 +294,7 @@ def _check_metadata(reader: TrialReader) -> None:
                 hint="Was the recording ended properly?",
             )
     if "provenance" not in reader.metadata:
-        raise TrialFileError(reader.path, "lacks metadata provenance")
+        raise TrialFileError(reader.path, "lacks the metadata section provenance")
 
 
 def _check_cycles(path: Path, cycles: Record) -> None:

@@ -71,7 +71,7 @@ def write_bundle(
         others: further files, e.g. a log of the bus.
 
     Raises:
-        TrialFileError: `to` exists, or the disk is full or gone.
+        TrialFileError: `to` exists, or the disk is full or unavailable.
     """
     contents = BundleContents()
     for name in _OF_SESSION:

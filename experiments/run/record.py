@@ -88,7 +88,7 @@ def record_trial(context: RunContext, name: TrialName) -> TrialOutcome:
 
     Raises:
         ArmFaultError, StopRequestedError: the trial was interrupted.
-        TrialLostError: the disk is full or gone, or the file fails verification.
+        TrialLostError: the disk is full or unavailable, or the file fails verification.
         ProcessLostError: a process has died.
     """
     header = trial_header(context.rig, context.metadata, name)

@@ -31,7 +31,7 @@ def recover_session(journal: Journal) -> str:
 
     Raises:
         SessionError: a recorder is still writing a trial file of the session.
-        TrialFileError: the disk is full or gone.
+        TrialFileError: the disk is full or unavailable.
     """
     folder = journal.folder
     _wait_for_recorder(folder)

@@ -54,7 +54,7 @@ def write_json(path: Path, value: Mapping[str, object]) -> None:
     """Replace `path` atomically: temporary file, fsync, rename.
 
     Raises:
-        TrialFileError: the disk is full or gone.
+        TrialFileError: the disk is full or unavailable.
     """
     write_text(path, json.dumps(value, indent=1, allow_nan=False))
 
@@ -63,7 +63,7 @@ def write_text(path: Path, text: str) -> None:
     """Replace `path` by `text`, as `write_json` does.
 
     Raises:
-        TrialFileError: the disk is full or gone.
+        TrialFileError: the disk is full or unavailable.
     """
     with writing(path), open_folder(path.parent) as folder:
         replace_file(folder, path.name, text.encode())
@@ -79,7 +79,7 @@ def write_new(path: Path, content: bytes) -> None:
     """Write `content` into a new file at `path`; never replaces one.
 
     Raises:
-        TrialFileError: `path` exists, or the disk is full or gone.
+        TrialFileError: `path` exists, or the disk is full or unavailable.
     """
     with writing(path), open_folder(path.parent) as folder:
         create_file(folder, path.name, content)
@@ -112,8 +112,8 @@ def move_file(source: Path, target: Path) -> None:
     A move that a kill interrupted, so that the file has both names, is completed.
 
     Raises:
-        TrialFileError: `target` exists, the disk is full or gone, or a path is no
-            regular file of the session.
+        TrialFileError: `target` exists, the disk is full or unavailable, or a path is
+            no regular file of the session.
     """
     with (
         writing(target),
@@ -138,7 +138,7 @@ def remove_file(path: Path) -> None:
     """Remove `path`, if it exists, and sync its directory.
 
     Raises:
-        TrialFileError: the disk is full or gone.
+        TrialFileError: the disk is full or unavailable.
     """
     with writing(path), open_folder(path.parent) as folder:
         with suppress(FileNotFoundError):

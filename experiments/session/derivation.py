@@ -38,7 +38,7 @@ def derive(folder: SessionFolder, state: SessionState) -> None:
         state: state after the whole journal.
 
     Raises:
-        TrialFileError: the disk is full or gone, or another file stands in the way.
+        TrialFileError: the disk is full or unavailable, or another file is in the way.
     """
     if state.phase is SessionPhase.PLANNED:
         return  # any files are the only evidence of a lost journal

@@ -32,13 +32,13 @@ class Journal:
 
         Raises:
             SessionError: the event is not allowed in this state.
-            TrialFileError: the disk is full or gone.
+            TrialFileError: the disk is full or unavailable.
         """
         utc = iso_utc(self.clock.utc_ns())
         entry: dict[str, object] = {"event": event, "utc": utc, **details}
         reason = refusal(self.state, entry)
         if reason:
-            raise SessionError(f"{self.folder.id}: {event} is refused, {reason}.")
+            raise SessionError(f"{self.folder.id}: {event} is refused: {reason}.")
         if event == Event.TRIAL_KEPT or details.get("verdict") == KEEP:
             entry |= self._checksum_and_size(entry)
         self.folder.append_event(entry)

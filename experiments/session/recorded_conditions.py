@@ -12,7 +12,7 @@ def write_conditions(folder: SessionFolder, values: Mapping[str, str]) -> None:
     """Write the conditions of a new session.
 
     Raises:
-        TrialFileError: the disk is full or gone.
+        TrialFileError: the disk is full or unavailable.
     """
     write_json(folder.path / FILE, dict(values))
 

@@ -81,7 +81,7 @@ class SessionFolder:
         A torn last line is terminated first, so that it does not damage the new one.
 
         Raises:
-            TrialFileError: the disk is full or gone.
+            TrialFileError: the disk is full or unavailable.
         """
         path = self.path / JOURNAL_FILE
         with writing(path):
@@ -197,12 +197,12 @@ def find_session(data: Path, name: str) -> SessionFolder:
         )
     if os.path.isfile(name):  # noqa: PTH113 - no error for a name that no file can have
         raise SessionError(
-            f"{name} is a file, and no session.",
+            f"{name} is a file, not a session.",
             hint=_file_hint(Path(name)),
         )
     if os.path.isfile(os.path.join(name, _PACKAGE)):  # noqa: PTH113, PTH118 - as above
         raise SessionError(
-            f"{name} is a folder of tables, and no session.",
+            f"{name} is a folder of tables, not a session.",
             hint=f"traction fit {name}",
         )
     known = " ".join(s.id for s in list_sessions(data)) or "none yet"

@@ -8,7 +8,7 @@ from experiments.settings.matrix import Angles, FarEnd, Heading, Incline, Travel
 
 
 class StatedPlace(SettingsSection):
-    """A container that several cells share.
+    """Place of a container, shared by several cells of the matrix.
 
     Attributes:
         far_end: point of the ground where trials start, in the base frame [m].
@@ -16,9 +16,9 @@ class StatedPlace(SettingsSection):
         incline_deg: incline of the container, positive if its far end is high
             [degrees].
         travel: length of a trial [m].
-        start: joint angles with the foot at the far end [rad]; left out: computed.
+        start: joint angles with the foot at the far end [rad]; computed if omitted.
         calibration: file of `traction calibrate terrain`.
-        taught: file of `traction teach`, which states all of these.
+        taught: file of `traction teach`, in place of the numbers above.
     """
 
     far_end: FarEnd | None = Field(default=None, examples=[[0.70, 0.0, 0.12]])
@@ -33,7 +33,7 @@ class StatedPlace(SettingsSection):
 
     @property
     def has_numbers(self) -> bool:
-        """Whether the place states its location."""
+        """Whether any number of the location is stated."""
         stated = self.far_end, self.heading_deg, self.incline_deg, self.travel
         return any(value is not None for value in stated)
 

@@ -13,8 +13,8 @@ from analysis.report.sections.rig_health.health import RigTrial
 _SATURATED = 1e-9  # share of saturated cycles above which it is reported
 _LIMITS_NOTE = (
     "Measurable: largest traction within the sensor's ranges, given the lever arm of "
-    "the foot; – if the ranges are unknown (if no sample was out of range, it is at "
-    "least the largest observed). "
+    "the foot; a dash if the ranges are unknown: it is then at least the largest "
+    "observed value, provided that no sample was out of range. "
     "Uncertainty: standard uncertainty of a trial's mean F_t and F_n, "
     "from the changes between the tares of its session; interpolating the zero "
     "between two tares (drift=interpolated) reduces it by a fifth. "
@@ -64,12 +64,12 @@ def limits_table(results: StudyResults) -> ReportTable:
             "largest |F_t| observed [N]",
             "measurable [N]",
             "sensor floor [N]",
-            "drift of the tare [N]",
+            "tare drift [N]",
             "uncertainty of mean F_t, F_n [N]",
             "best model's error [N]",
             "error over floor",
             "F_n above set load [N]",
-            "drag of the joints [N]",
+            "joint drag [N]",
         ),
         rows,
         note=_LIMITS_NOTE,

@@ -198,7 +198,7 @@ def test_a_file_given_as_a_session_is_refused_with_a_hint(tmp_path):
     table = tmp_path / "a.csv"
     table.write_text("t,v_t\n")
     for path, hint in ((trial, f"Name its session: {folder.id}"), (table, "fit FILE")):
-        with pytest.raises(SessionError, match="is a file, and no session") as caught:
+        with pytest.raises(SessionError, match="is a file, not a session") as caught:
             find_session(tmp_path, str(path))
         assert hint in caught.value.hint
 
@@ -213,7 +213,7 @@ def test_a_folder_of_tables_given_as_a_session_is_refused_with_a_hint(tmp_path):
 
 @pytest.mark.parametrize("terrain", ["G12.5dt", "G12dt+10", "B.0"])
 @pytest.mark.parametrize("is_simulated", [True, False])
-def test_a_terrain_name_with_signs_and_points_is_read_from_the_folder(
+def test_a_terrain_name_with_plus_signs_and_dots_is_read_from_the_folder(
     tmp_path, terrain, is_simulated
 ):
     made = create_session(tmp_path, terrain, is_simulated=is_simulated, utc_ns=0)
