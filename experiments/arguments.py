@@ -1,4 +1,4 @@
-"""Arguments shared by several commands; imports nothing slow."""
+"""Command-line options shared by several commands; imports nothing slow."""
 
 import math
 import shlex
@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Literal
 
 DEFAULT_DATA = Path("data")
-FRICTION = 0.4  # share of another arm's friction in simulated joints; ASSUMED
-CABLES = (8.0, 25.0)  # Hz, resonance of joints on cables; ASSUMED
+FRICTION = 0.4  # simulated joint friction as a fraction of another arm's; ASSUMED
+CABLES = (8.0, 25.0)  # Hz, range of the resonance of cable-driven joints; ASSUMED
 PACES = ("steady", "slow", "fast", "clumsy")  # how the simulated person pushes
 # Time in a simulation: paced to real time, at full speed, or in processes.
 TimeMode = Literal["paced", "fast", "processes"]
@@ -18,11 +18,12 @@ TimeMode = Literal["paced", "fast", "processes"]
 def add_global_options(
     parser: ArgumentParser, *, is_after_command: bool = False
 ) -> None:
-    """Declare the options before or after the command; the last one wins.
+    """Add the global options, before or after the command; the last one wins.
 
     Args:
-        parser: parser of the program, or of one command.
-        is_after_command: parser of a command: omitted options keep their value.
+        parser: parser of the program or of one command.
+        is_after_command: whether `parser` is a command's, where an omitted option
+            keeps the value given before the command.
     """
     default = SUPPRESS if is_after_command else None
     group = parser.add_argument_group("global options")
@@ -49,10 +50,10 @@ def add_global_options(
 
 
 def whole_number(text: str) -> int:
-    """Parse a whole number >= 0.
+    """Parse a non-negative integer.
 
     Raises:
-        ArgumentTypeError: `text` is no whole number of at least 0.
+        ArgumentTypeError: `text` is not a non-negative integer.
     """
     if not (text.isascii() and text.isdigit() and len(text) <= 18):
         raise ArgumentTypeError(f"{text!r} - expected a whole number >= 0, e.g. 1")
@@ -60,9 +61,9 @@ def whole_number(text: str) -> int:
 
 
 def number_within(least: float, most: float, wanted: str) -> Callable[[str], float]:
-    """Return a parser of numbers from `least` to `most`; `wanted` describes them.
+    """Return a parser for numbers in [least, most].
 
-    The parser raises ArgumentTypeError.
+    `wanted` describes the range in the ArgumentTypeError that the parser raises.
     """
 
     def read(text: str) -> float:
@@ -78,30 +79,34 @@ def number_within(least: float, most: float, wanted: str) -> Callable[[str], flo
 
 
 def add_simulation_options(parser: ArgumentParser) -> None:
-    """Declare the options of the simulated arm."""
+    """Add the options of the simulated arm."""
     parser.add_argument(
-        "--seed", type=int, default=1, metavar="N", help="seed of the simulation (1)"
+        "--seed",
+        type=int,
+        default=1,
+        metavar="N",
+        help="seed of the simulation (default 1)",
     )
     parser.add_argument(
         "--friction",
         type=float,
         metavar="SHARE",
         help="friction of the simulated joints: 1 = as identified on another arm "
-        f"({FRICTION:g})",
+        f"(default {FRICTION:g})",
     )
     parser.add_argument(
         "--cables",
         type=number_within(*CABLES, "a resonance of 8 to 25 Hz, e.g. 15"),
         metavar="HZ",
-        help="resonance of the simulated joints on elastic cables (rigid)",
+        help="resonance of the simulated joints on elastic cables (default rigid)",
     )
 
 
 def friction_share(args: Namespace) -> float:
-    """Return the friction of the simulated joints, as a share of another arm's.
+    """Return the simulated joint friction as a fraction of another arm's.
 
     Raises:
-        SettingsError: the number is out of range.
+        SettingsError: --friction is out of range.
     """
     from acquisition.errors import SettingsError
 
@@ -117,36 +122,36 @@ def friction_share(args: Namespace) -> float:
 
 
 def add_seed_option(parser: ArgumentParser) -> None:
-    """Declare the seed of the training points of Gaussian processes."""
+    """Add the seed for selecting the training points of Gaussian processes."""
     parser.add_argument(
         "--points-seed",
         dest="seed",
         type=whole_number,
         default=0,
         metavar="N",
-        help="seed of the choice of training points (0)",
+        help="seed for selecting the GP training points (default 0)",
     )
 
 
 def add_analysis_options(parser: ArgumentParser) -> None:
-    """Declare the choices of an analysis."""
-    group = parser.add_argument_group("choices of the analysis")
+    """Add the analysis options."""
+    group = parser.add_argument_group("analysis options")
     group.add_argument(
         "--smooth",
         type=int,
         metavar="N",
-        help="width of the moving average, samples at 500 Hz, odd (11: 22 ms)",
+        help="width of the moving average, samples at 500 Hz, odd (default 11, 22 ms)",
     )
     group.add_argument(
         "--every",
         type=int,
         metavar="N",
-        help="keep every N-th sample at 500 Hz (5: 10 ms)",
+        help="keep every N-th sample at 500 Hz (default 5, 10 ms)",
     )
     group.add_argument(
         "--window",
         metavar="LOW:HIGH",
-        help="range of velocities to keep [m/s] (0.005:0.2)",
+        help="range of v_t to keep [m/s] (default 0.005:0.2)",
     )
     group.add_argument(
         "--bounds",
@@ -163,14 +168,14 @@ def add_analysis_options(parser: ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="repeat the study with another choice and show both: smoothing=N, "
+        help="repeat the study with another setting and show both: smoothing=N, "
         "window=LOW:HIGH, lag=MS, frame=sole, drift=interpolated, "
-        "kernel=as_printed, static_friction=proportional; more than once for several",
+        "kernel=as_printed, static_friction=proportional; can be repeated",
     )
 
 
 def add_covariate_option(parser: ArgumentParser, columns: str) -> None:
-    """Declare the columns to test; `columns` lists the available ones."""
+    """Add --covariate; `columns` lists the available columns in its help."""
     parser.add_argument(
         "--covariate",
         metavar="NAME,..",
@@ -180,7 +185,7 @@ def add_covariate_option(parser: ArgumentParser, columns: str) -> None:
 
 
 def add_table_options(parser: ArgumentParser) -> None:
-    """Declare the options for external tables."""
+    """Add the options for external tables."""
     group = parser.add_argument_group("tables")
     group.add_argument(
         "--columns",
@@ -190,12 +195,12 @@ def add_table_options(parser: ArgumentParser) -> None:
         "rows",
     )
     group.add_argument(
-        "--unit", metavar="v_t=mm/s,..", help="units where a header gives none"
+        "--unit", metavar="v_t=mm/s,..", help="units of columns whose header gives none"
     )
     group.add_argument(
         "--negate",
         metavar="F_n,..",
-        help="columns with the opposite sign, e.g. F_n negative in compression",
+        help="columns to negate, e.g. F_n if it is negative in compression",
     )
     group.add_argument(
         "--sep",
@@ -228,7 +233,7 @@ def add_table_options(parser: ArgumentParser) -> None:
 
 
 def add_scheduler_option(parser: ArgumentParser) -> None:
-    """Declare the scheduler of the fits."""
+    """Add --scheduler."""
     parser.add_argument(
         "--scheduler",
         metavar="ADDRESS",
@@ -238,16 +243,16 @@ def add_scheduler_option(parser: ArgumentParser) -> None:
 
 
 def add_pdf_option(parser: ArgumentParser) -> None:
-    """Declare the option for figures as PDF."""
+    """Add --pdf."""
     parser.add_argument(
         "--pdf",
         action="store_true",
-        help="also write the figures as PDF; takes a few seconds more",
+        help="also write the figures as PDF, which takes a few seconds",
     )
 
 
 def add_time_options(parser: ArgumentParser) -> None:
-    """Declare the mode of time in a simulation."""
+    """Add the time-mode options of a simulation."""
     chosen = parser.add_mutually_exclusive_group()
     chosen.add_argument(
         "--fast",
@@ -263,19 +268,21 @@ def add_time_options(parser: ArgumentParser) -> None:
 
 
 def requested_time_mode(args: Namespace) -> TimeMode | None:
-    """Return the requested mode of simulated time; None if not given."""
+    """Return the requested time mode of a simulation; None if not given."""
     if args.fast:
         return "fast"
     return "processes" if args.processes else None
 
 
 def add_recording_options(parser: ArgumentParser) -> None:
-    """Declare the options of commands that open a new session."""
-    parser.add_argument("terrain", metavar="TERRAIN", help="a name in matrix.toml")
-    parser.add_argument("--fake", action="store_true", help="simulated devices")
+    """Add the options of commands that open a new session."""
+    parser.add_argument(
+        "terrain", metavar="TERRAIN", help="name of a terrain in matrix.toml"
+    )
+    parser.add_argument("--fake", action="store_true", help="use simulated devices")
     add_time_options(parser)
     parser.add_argument(
-        "--trials", type=int, metavar="N", help="trials to keep (as in matrix.toml)"
+        "--trials", type=int, metavar="N", help="trials to keep (default: matrix.toml)"
     )
     parser.add_argument(
         "--operator", default="", metavar="NAME", help="name of the operator"
@@ -285,14 +292,14 @@ def add_recording_options(parser: ArgumentParser) -> None:
         "--pace",
         choices=PACES,
         default=PACES[0],
-        help="how the simulated person pushes (steady)",
+        help="how the simulated person pushes (default steady)",
     )
     add_fault_option(parser)
     parser.add_argument(
         "--operator-script",
         metavar="FILE|auto",
-        help="keys, one per line: keep, redo 1..5, remark TEXT, quit; before a trial "
-        "pause, note TEXT, view, last, undo",
+        help="file of keys, one per line: keep, redo 1..5, remark TEXT, quit; before a "
+        "trial pause, note TEXT, view, last, undo",
     )
     parser.add_argument(
         "--new", action="store_true", help="close an unfinished session first"
@@ -303,16 +310,16 @@ def add_recording_options(parser: ArgumentParser) -> None:
 
 
 def add_reopening_options(parser: ArgumentParser) -> None:
-    """Declare the options of commands that open a session again."""
+    """Add the options shared by resume and redo."""
     parser.add_argument(
-        "--fake", action="store_true", help="accept a simulated session only"
+        "--fake", action="store_true", help="accept only a simulated session"
     )
     add_time_options(parser)
     parser.add_argument(
         "--operator",
         default="",
         metavar="NAME",
-        help="name of the operator (as before)",
+        help="name of the operator (default: as before)",
     )
     parser.add_argument(
         "--force", action="store_true", help="record even if conditions have changed"
@@ -320,7 +327,7 @@ def add_reopening_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--operator-script",
         metavar="FILE|auto",
-        help="keys for the reviews (simulation only)",
+        help="file of keys for the reviews (simulation only)",
     )
     add_allow_missing_option(parser)
     add_fault_option(parser)
@@ -330,7 +337,7 @@ def add_reopening_options(parser: ArgumentParser) -> None:
 
 
 def add_allow_missing_option(parser: ArgumentParser) -> None:
-    """Declare the option to continue without missing or changed kept trials."""
+    """Add --allow-missing."""
     parser.add_argument(
         "--allow-missing",
         action="store_true",
@@ -339,44 +346,44 @@ def add_allow_missing_option(parser: ArgumentParser) -> None:
 
 
 def add_fault_option(parser: ArgumentParser) -> None:
-    """Declare the faults to inject into a rehearsal."""
+    """Add --fault."""
     parser.add_argument(
         "--fault",
         action="append",
         default=[],
         metavar="NAME[@Tn+SECONDSs]",
-        help="raise a fault (simulation only); can be repeated",
+        help="inject a fault (simulation only); can be repeated",
     )
 
 
 def add_port_option(parser: ArgumentParser, when: str = "") -> None:
-    """Declare the port of viewers; `when` names the option that needs it."""
+    """Add --port for viewers; `when` is a help prefix that names its option."""
     parser.add_argument(
         "--port",
         type=number_within(0, 65_535, "a whole number 0..65535, e.g. 8765"),
         default=8765,
         metavar="N",
-        help=f"{when}port on 127.0.0.1 (8765); 0 = any free port",
+        help=f"{when}port on 127.0.0.1 (default 8765); 0 = any free port",
     )
 
 
 def add_author_option(parser: ArgumentParser) -> None:
-    """Declare the author of a note or a verdict."""
+    """Add --operator, the author of a note or verdict."""
     parser.add_argument(
         "--operator",
         default="",
         metavar="NAME",
-        help="name of the operator (your login)",
+        help="name of the operator (default: your login)",
     )
 
 
 def data_option(data: Path) -> str:
-    """Return the option for `data` in a command to type, "" for the default."""
+    """Return the --data option of a suggested command; "" for the default folder."""
     return "" if str(data) == "data" else f" --data {shlex.quote(str(data))}"
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
-    """Return the most similar known name; None if none is similar."""
+    """Return the known name most similar to `name`; None if none is similar."""
     from difflib import get_close_matches
 
     names = {candidate.lower(): candidate for candidate in known}
@@ -385,6 +392,6 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Return "Did you mean NAME?" for the nearest known name, or nothing."""
+    """Return "Did you mean NAME?" for the most similar known name, or ""."""
     meant = nearest(name, known)
     return "" if meant is None else f"Did you mean {meant}?"

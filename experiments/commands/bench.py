@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `bench`."""
     parser.add_argument("--fake", action="store_true", help="simulated devices")
     parser.add_argument(
-        "--seconds", type=float, default=60.0, metavar="N", help="duration (60)"
+        "--seconds", type=float, default=60.0, metavar="N", help="duration (default 60)"
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
 

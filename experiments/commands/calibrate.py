@@ -43,7 +43,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="file that is written (beside rig.toml)",
     )
     parser.add_argument(
-        "--poses", type=int, default=12, metavar="N", help="number of poses (12)"
+        "--poses",
+        type=int,
+        default=12,
+        metavar="N",
+        help="number of poses (default 12)",
     )
     parser.add_argument(
         "--pose-file",

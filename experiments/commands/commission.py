@@ -66,7 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a drive cable was tensioned or replaced: C5 to C11 are stale",
     )
     parser.add_argument(
-        "--operator", metavar="NAME", help="name of the operator (your login)"
+        "--operator", metavar="NAME", help="name of the operator (default: your login)"
     )
     add_arm(parser)
 

@@ -64,13 +64,13 @@ def _add_targets(parser: argparse.ArgumentParser) -> None:
         help=f"formats of controllers: {', '.join(target_names())}",
     )
     group.add_argument(
-        "--terrain", metavar="NAME,..", help="terrains of the database (all)"
+        "--terrain", metavar="NAME,..", help="terrains of the database (default all)"
     )
     group.add_argument(
         "--model", metavar="NAME", help="model of the database (its default)"
     )
     group.add_argument(
-        "--float", action="store_true", help="single precision in C (double)"
+        "--float", action="store_true", help="single precision in C (default double)"
     )
 
 

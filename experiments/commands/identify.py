@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         choices=_WINDOWS,
         default=100,
-        help="samples of motion per answer: 50, 100 or 200 are 0.5, 1 or 2 s (100)",
+        help="samples of motion per answer: 50, 100 (default) or 200 are 0.5, 1 or 2 s",
     )
     add_table_options(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")

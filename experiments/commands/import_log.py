@@ -124,7 +124,10 @@ def _add_ground(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--along", metavar="X,Y,Z", help="direction of the slip")
     group.add_argument("--normal", metavar="X,Y,Z", help="normal of the ground")
     group.add_argument(
-        "--terrain", default="table", metavar="NAME", help="name of the ground (table)"
+        "--terrain",
+        default="table",
+        metavar="NAME",
+        help="name of the ground (default table)",
     )
     group.add_argument(
         "--factor",

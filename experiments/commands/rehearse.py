@@ -28,7 +28,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_simulation_options(parser)
     add_truth(parser)
     parser.add_argument(
-        "--trials", type=int, default=10, metavar="N", help="trials per terrain (10)"
+        "--trials",
+        type=int,
+        default=10,
+        metavar="N",
+        help="trials per terrain (default 10)",
     )
     parser.add_argument(
         "--jobs", type=int, metavar="N", help="processes at a time (one per core)"

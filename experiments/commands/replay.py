@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=number_within(0.01, 10_000, "a number > 0, e.g. 2"),
         default=1.0,
         metavar="N",
-        help="replay speed (1)",
+        help="replay speed (default 1)",
     )
     parser.add_argument(
         "--can",

@@ -53,7 +53,7 @@ class ReportRequest:
         seed: seed of the training points of the Gaussian processes.
         terrains: names in the matrix's order; none for tables.
         scheduler: address of a Dask scheduler; None = this machine.
-        choices: choices of the analysis.
+        choices: settings of the analysis.
         missing: messages on missing or changed kept trials.
         covariates: names of the columns to test.
         out: folder of the report; None = that of the session, or `data`/study.
