@@ -66,7 +66,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="clock to use if sender and recorder disagree",
     )
     parser.add_argument(
-        "--trials", metavar="T0:T1,..", help="one interval of the log per trial [s]"
+        "--trials",
+        metavar="T0:T1,..",
+        help="seconds of the log, one interval per trial",
     )
     parser.add_argument(
         "--slow", action="store_true", help="accept rates below 50 Hz, for means only"
@@ -97,7 +99,7 @@ def _add_wrench(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--tare",
         metavar="T0:T1|..",
-        help="interval of the log [s] in which the foot is free, the reading without "
+        help="seconds of the log in which the foot is free, the reading without "
         "load (six numbers), or none if the sensor is tared",
     )
     group.add_argument(
