@@ -1,4 +1,4 @@
-"""Force available from rest: break-away models compared with the pushes."""
+"""Force available from rest: break-away models compared with recorded pushes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from analysis.study.slip_risk import BREAK_AWAY, SLIDING, BreakAwayModel
 from analysis.study.survival import SurvivalCurve, kaplan_meier, pit_limit
 from analysis.study.terrain_fit import TerrainResult
 
-RISKS = (0.05, 0.1, 0.5)  # risks at which forces are stated
+RISKS = (0.05, 0.1, 0.5)  # slip probabilities at which forces are stated
 BREAK_AWAY_UNITS = {
     "law": "log N (sliding: N), 1, log N, log N",
     "v_slip": "m/s",
@@ -27,7 +27,7 @@ _POINTS = 60  # points of a curve
 _CURVES = ("#0072B2", "#D55E00", "#009E73")
 _STYLES = ("-", "--", "-.")
 _SLIP, _HELD = "#4d4d4d", "#CC79A7"
-_MIDDLE = RISKS[1]  # risk of the curve with an interval
+_SHOWN_RISK = RISKS[1]  # risk of the curve with an interval, and in the caption
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +36,11 @@ class TerrainBreakAway:
 
     Attributes:
         terrain: name of the terrain.
-        title: name and kind in words.
-        model: fit to all trials.
-        pushes: pushes of all trials in order.
+        title: name and kind of the terrain.
+        model: model fitted to all trials.
+        pushes: pushes of all kept trials, in order.
         motion: mean and standard deviation [N] of F_t at the slowest velocity of the
-            window and the median load; None without a Gaussian process.
+            window and the median normal force; None without a Gaussian process.
     """
 
     terrain: str
@@ -61,12 +61,12 @@ class TerrainBreakAway:
 
     @property
     def is_held(self) -> np.ndarray:
-        """Which pushes held, shape (n,)."""
+        """Whether each push held, shape (n,)."""
         return np.array([push.is_held for push in self.pushes], dtype=bool)
 
     @property
     def load(self) -> float:
-        """Median F_n of the pushes, or the middle of the model's range [N]."""
+        """Median F_n of the pushes, or of the model's range without pushes [N]."""
         return float(np.median(self.F_n if self.pushes else self.model.loads))
 
     @property
@@ -76,7 +76,7 @@ class TerrainBreakAway:
 
     @property
     def forces(self) -> Array:
-        """Traction forces at which curves are drawn [N], from zero to the largest."""
+        """Traction forces at which curves are drawn [N], from 0 to the largest."""
         most = max([self.model.forces[1], *self.peaks.tolist()])
         return np.linspace(0.0, most, _POINTS)
 
@@ -89,7 +89,7 @@ class TerrainBreakAway:
 
     @property
     def mean_risk(self) -> Array:
-        """Risk by the model at `forces`, mean over the loads of the pushes."""
+        """Model risk at `forces`, averaged over the normal forces of the pushes."""
         risks = [
             self.model.risks(np.full(self.F_n.size, force), self.F_n)
             for force in self.forces
@@ -97,14 +97,14 @@ class TerrainBreakAway:
         return np.array([float(np.mean(risk)) for risk in risks])
 
     @property
-    def limit(self) -> float | None:
-        """Critical distance from the Kaplan-Meier curve at the 5 % level."""
+    def critical_distance(self) -> float | None:
+        """Critical value of `model.distance` at the 5 % level; None for sliding."""
         if self.model.kind != BREAK_AWAY:
             return None
         return pit_limit(self.model.slips)
 
     def motion_quantile(self, share: float) -> float | None:
-        """Return the quantile of F_t in motion [N]; None without `motion`."""
+        """Return the quantile `share` of F_t in motion [N]; None without `motion`."""
         from scipy.special import ndtri
 
         if self.motion is None:
@@ -123,7 +123,7 @@ class TerrainBreakAway:
                 for risk, a in zip(RISKS, available, strict=True)
             ],
             "in_motion": {str(risk): self.motion_quantile(risk) for risk in RISKS},
-            "limit": self.limit,
+            "limit": self.critical_distance,
             "pushes": [
                 [push.peak, push.F_n, float(push.is_held)] for push in self.pushes
             ],
@@ -131,7 +131,7 @@ class TerrainBreakAway:
 
 
 def break_away_findings(results: StudyResults) -> Mapping[str, TerrainBreakAway]:
-    """Return the break-away model and pushes of every terrain that has a model."""
+    """Return the model and pushes of every terrain with a break-away model."""
     study = results.study
     return {
         name: _of_terrain(study.terrains[name], model, study.options.prepare.slowest)
@@ -173,28 +173,29 @@ def break_away_table(results: StudyResults) -> ReportTable:
             "F_n [N]",
             *(f"F_t at risk {risk:g} [N]" for risk in RISKS),
             *(f"in motion at {risk:g} [N]" for risk in RISKS),
-            "distance (limit)",
+            "distance (critical)",
             "trial effect",
         ),
         rows=[_break_away_row(terrain) for terrain in terrains.values()],
-        note="From rest: force at which a push at a new location in a new trial has "
-        f"slipped (v_t above {', '.join(f'{v:g}' for v in speeds)} m/s) with the "
-        "stated risk; brackets: 90 % bootstrap interval over trials. "
+        note="From rest: force by which a push in a new trial has slipped (v_t above "
+        f"{', '.join(f'{v:g}' for v in speeds)} m/s) with the stated probability; "
+        "brackets: 90 % bootstrap interval over trials. "
         '"sliding": too few pushes slipped, so the force of slow sliding is used. In '
-        "motion: quantile of F_t at the slowest velocity of the window at the same "
-        "risk, by GP-SE. F_n: median of the pushes. Distance: between model and "
-        "Kaplan-Meier curve, with the critical value at 5 %. Trial effect: standard "
-        'deviation between trials of log force, or of the force for "sliding".',
+        "motion: quantile of F_t (GP-SE) for the same risk at the slowest velocity of "
+        "the window. F_n: median of the pushes. Distance: between model and "
+        "Kaplan-Meier curve, with its critical value at the 5 % level. Trial effect: "
+        "standard deviation between trials of log force, or of the force for "
+        '"sliding".',
         section=ReportSection.BEYOND,
     )
 
 
 def _break_away_row(terrain: TerrainBreakAway) -> list[str]:
     model, load = terrain.model, terrain.load
-    answers = [model.available(load, risk) for risk in RISKS]
+    available = [model.available(load, risk) for risk in RISKS]
     motion = [terrain.motion_quantile(risk) for risk in RISKS]
-    limit = terrain.limit
-    distance = "–" if limit is None else f"{model.distance:.2f} ({limit:.2f})"
+    critical = terrain.critical_distance
+    distance = "–" if critical is None else f"{model.distance:.2f} ({critical:.2f})"
     unit = " N" if model.kind == SLIDING else ""
     trial_sd = f"{model.law.trial_sd:.2f}{unit}"
     return [
@@ -203,7 +204,7 @@ def _break_away_row(terrain: TerrainBreakAway) -> list[str]:
         str(model.slips),
         str(model.held),
         f"{load:.1f}",
-        *(f"{a.force:.1f} ({a.low:.1f} to {a.high:.1f})" for a in answers),
+        *(f"{a.force:.1f} ({a.low:.1f} to {a.high:.1f})" for a in available),
         *("–" if force is None else f"{force:.1f}" for force in motion),
         distance,
         trial_sd if model.is_trial_seen else "not distinguishable from 0",
@@ -211,7 +212,7 @@ def _break_away_row(terrain: TerrainBreakAway) -> list[str]:
 
 
 def draw_available(results: StudyResults) -> Figure | None:
-    """Draw the force available over F_n, a panel per terrain, with the peaks."""
+    """Draw available force and peaks over F_n, one panel per terrain."""
     shown = list(results.of(break_away_findings).values())
     if not shown:
         return None
@@ -239,30 +240,30 @@ def draw_available(results: StudyResults) -> Figure | None:
 
 
 def caption_available(results: StudyResults) -> str:
-    """State the forces at the median load, from rest and in motion."""
+    """State the forces at the median F_n, from rest and in motion."""
     terrains = results.of(break_away_findings)
     parts = []
     for name, terrain in terrains.items():
-        answer = terrain.model.available(terrain.load, _MIDDLE)
-        motion = terrain.motion_quantile(_MIDDLE)
+        available = terrain.model.available(terrain.load, _SHOWN_RISK)
+        motion = terrain.motion_quantile(_SHOWN_RISK)
         parts.append(
-            f"{name} {answer.force:.1f} N ({answer.low:.1f} to {answer.high:.1f}) at "
-            f"{terrain.load:.1f} N"
+            f"{name} {available.force:.1f} N ({available.low:.1f} to "
+            f"{available.high:.1f}) at {terrain.load:.1f} N"
             + ("" if motion is None else f", in motion {motion:.1f} N")
         )
     speeds = {terrain.model.v_slip for terrain in terrains.values()}
     limits = ", ".join(f"{speed:g}" for speed in sorted(speeds))
     return (
-        f"Peaks of pushes from rest; a slip is faster than {limits} m/s. For a push "
-        "that held, break-away lies above its peak. Curves: force at which a push at a "
-        "new location in a new trial slips with the stated risk; band: 90 % bootstrap "
-        f"interval over trials at {_MIDDLE:g}. With risk {_MIDDLE:g}: "
-        f"{'; '.join(parts)}."
+        f"Peaks of pushes from rest; a slip exceeds {limits} m/s. For a push that "
+        "held, break-away lies above its peak. Curves: force by which a push in a new "
+        "trial has slipped with the stated probability; band: 90 % bootstrap interval "
+        f"over trials of the {_SHOWN_RISK:g} curve. Available force at risk "
+        f"{_SHOWN_RISK:g}: {'; '.join(parts)}."
     )
 
 
 def draw_risk(results: StudyResults) -> Figure | None:
-    """Draw the risk over the required force, with the Kaplan-Meier curve."""
+    """Draw model risk and Kaplan-Meier curve over the required force."""
     shown = [
         f for f in results.of(break_away_findings).values() if f.survival is not None
     ]
@@ -276,7 +277,7 @@ def draw_risk(results: StudyResults) -> Figure | None:
             terrain.mean_risk,
             color=_CURVES[1],
             lw=1.6,
-            label="model, mean over the loads",
+            label="model, mean over F_n",
         )
         _add_title(ax, terrain)
     axes[0].set_ylim(0.0, 1.25)  # space for the text
@@ -289,17 +290,18 @@ def draw_risk(results: StudyResults) -> Figure | None:
 
 
 def caption_risk(results: StudyResults) -> str:
-    """State the distance of the models from the Kaplan-Meier curves."""
+    """State the distances between models and Kaplan-Meier curves."""
     parts = [
-        f"{name} {terrain.model.distance:.2f} ({terrain.limit:.2f})"
+        f"{name} {terrain.model.distance:.2f} ({terrain.critical_distance:.2f})"
         for name, terrain in results.of(break_away_findings).items()
-        if terrain.limit is not None
+        if terrain.critical_distance is not None
     ]
     return (
-        "Steps: share of pushes that slipped below a force, those that held censored "
-        "at their peak (Kaplan-Meier); line: the model at the loads of the same "
-        "pushes. Largest difference of the probability transforms, and its critical "
-        f"value at 5 %: {', '.join(parts) or 'none'}."
+        "Steps: share of pushes that had slipped below a force (Kaplan-Meier); pushes "
+        "that held are censored at their peak. Line: the model at the normal forces of "
+        "the same pushes. Largest difference of the probability integral transforms, "
+        "and its critical value at the 5 % level: "
+        f"{', '.join(parts) or 'none'}."
     )
 
 
@@ -323,11 +325,13 @@ def _draw_peaks(ax: Axes, terrain: TerrainBreakAway) -> None:
 
 
 def _draw_interval(ax: Axes, terrain: TerrainBreakAway) -> None:
-    answers = [terrain.model.available(float(load), _MIDDLE) for load in terrain.loads]
+    available = [
+        terrain.model.available(float(load), _SHOWN_RISK) for load in terrain.loads
+    ]
     ax.fill_between(
         terrain.loads,
-        [answer.low for answer in answers],
-        [answer.high for answer in answers],
+        [force.low for force in available],
+        [force.high for force in available],
         color=_CURVES[1],
         alpha=0.2,
         lw=0,
@@ -367,8 +371,8 @@ def _legend(figure: Figure, axes: list[Axes]) -> None:
 BREAK_AWAY_FIGURE = FigureSpec(
     "break_away",
     "From rest: available force over normal force",
-    "Peaks of traction force over normal force, pushes that slipped and pushes "
-    "that held, with curves of the force available at three risks, one panel per "
+    "Peaks of traction force over normal force, of pushes that slipped and pushes "
+    "that held, with curves of the available force at three risks, one panel per "
     "terrain.",
     draw_available,
     caption_available,
@@ -377,8 +381,8 @@ BREAK_AWAY_FIGURE = FigureSpec(
 BREAK_AWAY_RISK_FIGURE = FigureSpec(
     "break_away_risk",
     "From rest: slip probability over required force",
-    "Probability of a slip over the required traction force, by "
-    "Kaplan-Meier and by the model, one panel per terrain.",
+    "Probability of a slip over the required traction force: Kaplan-Meier curve "
+    "and model, one panel per terrain.",
     draw_risk,
     caption_risk,
 )

@@ -41,8 +41,8 @@ def test_the_table_states_whether_the_model_is_break_away_or_sliding(results):
     table = break_away_table(results)
     assert cell(table, "S0", "from rest") == "break-away"
     assert cell(table, "TF", "from rest") == "sliding"
-    assert "(" in cell(table, "S0", "distance (limit)")
-    assert cell(table, "TF", "distance (limit)") == "–"
+    assert "(" in cell(table, "S0", "distance (critical)")
+    assert cell(table, "TF", "distance (critical)") == "–"
 
 
 def test_slip_and_hold_counts_match_the_pushes(results):
@@ -57,7 +57,7 @@ def test_survival_curve_and_model_agree_on_stones(results):
         observed_risk = terrain.survival.share_below(terrain.forces)
         # about 17 slips: standard error 0.12
         assert np.abs(observed_risk - terrain.mean_risk).max() < 0.3
-        assert terrain.model.distance < terrain.limit
+        assert terrain.model.distance < terrain.critical_distance
 
 
 def test_numbers_of_the_report_are_in_its_data_file(results):
