@@ -30,7 +30,7 @@ from analysis.study.new_trial import NewTrialFit
 from analysis.study.store import ResultStore
 from analysis.study.tasks import Workers, run_tasks
 
-TRAVEL = "way"  # travel since the last drop, computed from F_t and v_t
+TRAVEL = "travel"  # travel since the last drop, computed from F_t and v_t
 SPAN = 0.2  # s over which changes are compared with those of F_t
 REPEATED = 0.3  # share of the changes explained by F_t from which a column repeats it
 FEWEST = 3  # trials

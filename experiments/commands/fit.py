@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "table, e.g. an angle",
     )
     add_covariate_option(
-        parser, "columns of every table, and way (distance since the last drop of F_t)"
+        parser, "columns of every table, and travel (since the last drop of F_t)"
     )
     add_scheduler_option(parser)
     add_pdf_option(parser)

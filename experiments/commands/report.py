@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_scheduler_option(parser)
     add_covariate_option(
         parser,
-        "height (of the sole), way (distance since the last drop of F_t), lateral, "
+        "height (of the sole), travel (since the last drop of F_t), lateral, "
         "tilt, moment",
     )
     add_pdf_option(parser)
