@@ -274,7 +274,7 @@ def _rests(rests: tuple[MotorRest, ...], seen: Observation) -> tuple[MotorRest, 
 
 
 def _check_safety(facts: Facts) -> GuardVerdict:
-    """Idle if the safety circuit has; allow a silent circuit some time."""
+    """Idle on an E-stop or an idle circuit; allow a silent circuit some time."""
     seen = facts.seen
     if seen.safety is SafetyMode.UNKNOWN:
         age_ms = seen.safety_age_ns / NS_PER_MS

@@ -111,7 +111,8 @@ PD_TORQUE_LIMIT = np.array([25.0, 20.0, 15.0, 15.0, 5.0, 5.0, 5.0])  # N m, PD p
 class JointMove:
     """Straight joint-space trajectory from `start` to `goal` [rad], shapes (7,).
 
-    The joint with the longest travel has a trapezoidal speed, the others in proportion.
+    The joint with the longest travel has a trapezoidal speed, the others in proportion:
+    speed and acceleration are limited, jerk is not.
     """
 
     start: Array

@@ -1,4 +1,4 @@
-"""Conversion between joints and motors: radians and counts, N m and puck units.
+"""Conversion between joints and motors: radians and encoder counts, N m and puck units.
 
 The cables couple motors 2 and 3, and 5 and 6: `motor = j2mp @ joint`. Power is
 conserved, so `tau_motor = inverse(j2mp).T @ tau_joint`. Counts per turn and puck units
@@ -77,7 +77,7 @@ class Transmission:
         object.__setattr__(self, "_tau_of_units", j2mp.T / ipnm)
 
     def joints(self, counts: Sequence[float]) -> Vector:
-        """Return joint positions [rad], shape (7,), of motor positions [counts].
+        """Return joint positions [rad], shape (7,), of encoder counts of the motors.
 
         Also converts count rates [1/s] to joint velocities [rad/s].
         """

@@ -114,7 +114,7 @@ class MomentFit:
 def fit_moments(
     constants: ArmConstants, q: NDArray[np.float64], tau: NDArray[np.float64]
 ) -> MomentFit:
-    """Fit first moments to holding torques by least squares; see `check_fit`.
+    """Fit first moments to holding torques: gravity calibration by least squares.
 
     Args:
         constants: constants of the arm.
