@@ -100,7 +100,7 @@ CALLS: tuple[Border, ...] = (
     _refused(
         "load_tables of a dictionary of arrays",
         lambda _: tr.load_tables({"t": _ONE}),  # pyright: ignore
-        "is no name of a file",
+        "is neither a file name nor a list",
     ),
     _refused(
         'load_tables("a.csv", "b.csv")',

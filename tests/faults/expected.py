@@ -404,7 +404,7 @@ TABLE: dict[str, Row] = {
         "The CAN interface refuses to send and receive; no reply",
         _UNKNOWN,
         "can-silence",
-        preflight=_refused("CAN fake bus broke"),
+        preflight=_refused("CAN fake bus failed"),
         idle=_not_ready("The CAN interface refuses to send and receive."),
     ),
     "unacknowledged": _ending(

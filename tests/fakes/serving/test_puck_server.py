@@ -212,7 +212,7 @@ def test_a_port_on_another_bus_ignores_frames_of_other_kinds():
 def test_a_port_with_a_broken_bus_reports_it():
     port = CanPort("virtual", "broken", 1_000_000)
     port.close()
-    with pytest.raises(LinkError, match="virtual:broken broke"):
+    with pytest.raises(LinkError, match="virtual:broken failed"):
         port.receive()
     port.send(1, b"")
     assert port.lost == 1
