@@ -1,6 +1,6 @@
 """Measured bounds of every fault: `python -m tests.faults.bounds [PART OF A NAME]`.
 
-They apply to a trial with a person's push and to a move by the arm itself. They are
+They apply to a trial with a person's push and to an autonomous move. They are
 stored in bounds.json beside this module, so that tables are printed without a run; the
 matrix checks its cells against them. A run takes about ten minutes.
 """
@@ -48,7 +48,7 @@ class PrintedBound:
 
 
 def cells_of_all() -> list[tuple[str, str, Cell]]:
-    """Return (fault, phase, outcome) of every cell, the arm's own moves included."""
+    """Return (fault, phase, outcome) of every cell, autonomous moves included."""
     moving = [
         (fault, MOVING, cell)
         for fault, cell in MOVING_CELLS.items()

@@ -18,16 +18,16 @@ class End(Enum):
     COMPLETE = "nothing happens"
     REFUSED = "refused, nothing created"
     NOT_ACTIVATED = "not activated, resumed"
-    REPORTED = "reported, the trial goes on or is redone"
+    REPORTED = "reported, the trial continues or is redone"
     REDONE = "trial interrupted and redone"
     UNTARED = "five tares refused, resumed"
     UNBRACKETED = "kept, the last tare is missing"
     ENDED = "session ends, resumed"
-    SOMEHOW = "stopped; the session goes on or ends"
+    SOMEHOW = "stopped; the session continues or ends"
     UNMEASURED = "the arm stops, nothing is written"
     UNSTARTED = "nothing is created"
-    UNWRITTEN = "session ends, what is on the disk stays"
-    STOPPED = "unfinished on purpose, resumed"
+    UNWRITTEN = "session ends, data on the disk are kept"
+    STOPPED = "left unfinished by a signal, resumed"
     INTERRUPTED = "ends at once"
     KILLED = "ends; the arm is idle without it, resumed"
     LOST_EARLY = "ends, nothing recorded"
@@ -39,9 +39,9 @@ class Arm:
     """The reaction of the arm and the longest time from the fault to it.
 
     Attributes:
-        limit_ms: the limit that the fault reaches; 20 ms are added to it.
-        seen: by the pucks: "driven", "last torques", "idle", "without power", or
-            DAMPED_OR_IDLE in any state of the loop.
+        limit_ms: the time limit of the fault; 20 ms are added to it.
+        seen: the state by the pucks: "driven", "last torques", "idle", "without
+            power", or DAMPED_OR_IDLE in any state of the loop.
         state: of the loop; None = any.
         text: the words of the message about the arm.
     """
@@ -80,7 +80,7 @@ OK = Cell(End.COMPLETE)
 NO_LOOP = Cell(End.ABSENT, why="the loop does not run yet")
 UNSEEN = Cell(
     End.COMPLETE,
-    why="not while the sole stands; motors 2 to 6 end a trial after 60 mm of it",
+    why="not detected while the sole is at rest; motors 2 to 6 end a trial after 60 mm",
 )
 OTHER_REFUSED = Cell(End.COMPLETE, why="the other command is refused (arm-busy)")
 AT_REVIEW = ("session ended at the review",)
@@ -135,7 +135,7 @@ _IN_STOP = replace(
 def _module(word: str, idle: Cell) -> Row:
     """Return the row of an immediate fault of a monitor of the safety module."""
     text = f"{_MODULE}{word} fault."
-    resent = replace(OK, why="the start-up sends the module its limits again")
+    resent = replace(OK, why="the module's limits are written again at start")
     return _ending(text, _IDLE, "pendant-idle", preflight=resent, idle=idle)
 
 
@@ -148,7 +148,7 @@ def _sensor(limit_ms: float, waits: str, preflight: Cell, **others: Cell) -> Row
         "preflight": preflight,
         "ready": replace(redone, arm=None, why="stops as soon as it is recorded"),
         "recording": redone,
-        "review": replace(waiting, why="the trial is whole; the last tare waits"),
+        "review": replace(waiting, why="the trial is complete; the last tare waits"),
     }
     return _row(waiting, **{**phases, **others})
 
@@ -174,7 +174,7 @@ def _limit(text: str, why: str, **others: Cell) -> Row:
     warned = Cell(End.REPORTED, text, arm=_DAMPED)
     phases = {
         "preflight": NO_LOOP,
-        "idle": Cell(End.ENDED, text, why="found when the arm becomes active"),
+        "idle": Cell(End.ENDED, text, why="detected when the arm becomes active"),
         "recording": replace(warned, end=End.REDONE, rejected=(f"interrupted: {why}",)),
         "end": OK,
     }
@@ -184,30 +184,30 @@ def _limit(text: str, why: str, **others: Cell) -> Row:
 def _creeping(motor: int) -> Row:
     """Return the row of an encoder that drifts until a limit stops the arm.
 
-    Joint 7 turns the foot about its own axis, so only its stop or its lock show it.
+    Joint 7 turns the foot about its own axis, so only its stop or its lock reveals it.
     """
     arm = Arm(1700 if motor == 7 else 400, DAMPED_OR_IDLE, None, "")
     stopped = Cell(End.SOMEHOW, arm=arm)
-    late = Cell(End.SOMEHOW, why="found when the arm becomes active")
+    late = Cell(End.SOMEHOW, why="detected when the arm becomes active")
     then = "Damping does not slow the arm down: the sole's speed" if motor == 7 else ""
     return _row(stopped, preflight=late, idle=late, end=replace(OK, arm=arm, then=then))
 
 
 _BEGUN = replace(
     OK,
-    why="for 0.15 s after a hold began only the energy is judged; a wrist has little",
+    why="only the energy is checked in the first 0.15 s of a hold; a wrist has little",
 )
 
 
 def _lying(motor: int) -> Row:
     """Return the row of an encoder that jumps by a step that the driver accepts."""
-    if motor == 4:  # the arm turns too little about its joint
+    if motor == 4:  # joint 4 turns too little to be detected
         return _row(OK)
     stopped = Cell(
         End.ENDED,
         "The arm does not stay in place while it holds: ",
         arm=_IDLE,
-        why="the jump seems a motion, and the arm idles",
+        why="the step is taken for motion, and the arm is idled",
     )
     if motor in {5, 6}:
         return _row(OK, tare=stopped, review=_BEGUN)
@@ -227,12 +227,12 @@ _NO_FRAME = _refused("No whole F/T frame")
 _FEW = "are too few for a tare"
 _FLAGGED = "F/T samples were flagged during tare"
 _ASKED = "Joint 7 would need "
-_STAYS = replace(OK, why="the arm is idle, and stays so")
+_STAYS = replace(OK, why="the arm is idle and remains idle")
 _PUSHED_AWAY = Cell(
     End.ENDED,
     "The arm does not stay in place while it holds",
     arm=Arm(10, "idle", ArmState.IDLE, "idle"),
-    why="it holds already, and is pushed away",
+    why="the arm is already in hold and is pushed away",
 )
 _BRAKED = Cell(End.ABSENT, why="joint 7 is damped like the others")
 _SLIP = Cell(
@@ -244,7 +244,7 @@ _SLIP = Cell(
 _SLIP_LATER = replace(
     _SLIP,
     arm=None,
-    why="watched in trials: stops the next one; let go, the foot swings back",
+    why="checked in trials, stops the next one; a released foot swings back",
     then=" rad/s (limit 4.00)",
 )
 # After a fault that ends a trial, the console requests hold 20 ms later.
@@ -261,9 +261,9 @@ _LOADED = Cell(
     Arm(30, "driven", HOLD, "holding"),
 )
 _PAST = " answered an earlier request: positions are "
-# One cycle in 47 requests nothing; late positions are then confirmed within 20 ms.
+# One cycle in 47 has no request; late positions are then confirmed within 20 ms.
 _OLD = Arm(120, "idle", ArmState.IDLE, "UNKNOWN, held with old positions")
-_UNCONFIRMED = replace(OK, why="the session ends before a cycle asks for nothing")
+_UNCONFIRMED = replace(OK, why="the session ends before a cycle without a request")
 
 
 def _late() -> Row:
@@ -283,28 +283,28 @@ def _wrong_property(name: str, puck: int) -> Row:
     return _row(later, preflight=_refused(f"{name} of puck {puck} is "))
 
 
-_REVERSED = Cell(End.SOMEHOW, why="what moves the arm shows it, if anything does")
+_REVERSED = Cell(End.SOMEHOW, why="detected only by motion of the arm")
 _DEAD = Cell(
     End.SOMEHOW,
-    why="a person who holds the arm bears what the motor does not, and nothing that "
-    "is measured shows it; else the arm is idled as it sinks",
+    why="not detected while a person holding the arm supports the load of the motor; "
+    "otherwise the arm is idled as it sinks",
 )
-_NOT_REWIRED = Cell(End.ABSENT, why="no cable is changed while the arm is driven")
+_NOT_REWIRED = Cell(End.ABSENT, why="cables are not changed while the arm is driven")
 _ASKED_IN_TURN = replace(
-    OK, why="one property is asked for every 0.1 s: all of them take 3.5 s"
+    OK, why="one property is read every 0.1 s, so that all of them take 3.5 s"
 )
-_LET_GO = replace(OK, why="the arm holds, or lies with its virtual weight")
-_DRAGGED = replace(OK, why="the person gives way at the next prompt, within 0.2 m")
+_LET_GO = replace(OK, why="the arm holds, or rests on the ground with its virtual mass")
+_DRAGGED = replace(OK, why="the person yields at the next prompt, within 0.2 m")
 _WEAK = Cell(
     End.SOMEHOW,
     arm=Arm(30, DAMPED_OR_IDLE, None, ""),
-    why="too little torque damps little: the arm is idled if it goes on",
+    why="limited torque damps weakly: the arm is idled if it keeps moving",
 )
-_NOT_HELD = Cell(End.ABSENT, why="an idle arm holds against nobody")
+_NOT_HELD = Cell(End.ABSENT, why="an idle arm does not hold")
 _NEVER_SEEN_ACTIVE = Cell(
     End.NOT_ACTIVATED,
     "The arm was not activated within 120 s.",
-    why="the module says idle for ever, and the arm is held",
+    why="the module reports IDLE permanently, and the arm is held",
 )
 _SHARED = "Another program sends to the arm: frame "
 _TWICE = "Puck 3 sends more replies than there are requests"
@@ -323,7 +323,7 @@ _SET_ANEW = replace(OK, why="the arm's activation sets the mode of every puck")
 def _disobeying(later: Cell) -> Row:
     """Return the row of a puck that no longer obeys.
 
-    `later`: the outcome of a fault before the arm is active.
+    `later`: the outcome of the fault if the arm is not yet active.
     """
     why = "puck-disobeys"
     return _ending(_DISOBEYS, _CAUGHT, why, preflight=later, idle=later)
@@ -333,13 +333,13 @@ _JUMPED = Cell(
     End.ENDED,
     "The position of motor 7 jumped by ",
     arm=replace(_SILENT, seen="driven", text="UNKNOWN - support it"),
-    why="its position is another one, too",
+    why="its position changes, too",
 )
 _UNSEEN_RESTART = replace(
     OK,
-    why="not seen of an idle arm; on the real one a puck that restarts falls asleep",
+    why="not detected while the arm is idle; on the real arm a restarted puck sleeps",
 )
-_NO_TORQUES = Cell(End.ENDED, _DISOBEYS, why="found when the arm becomes active")
+_NO_TORQUES = Cell(End.ENDED, _DISOBEYS, why="detected when the arm becomes active")
 _MISSED = _ending(
     "The pendant or the safety module put the arm to idle",
     replace(_IDLE, limit_ms=20),
@@ -348,7 +348,7 @@ _MISSED = _ending(
     idle=_NO_TORQUES,
 )
 
-NOTHING = "nothing"  # the reference of the others
+NOTHING = "nothing"  # reference for the other rows
 
 TABLE: dict[str, Row] = {
     NOTHING: _row(OK),
@@ -358,8 +358,8 @@ TABLE: dict[str, Row] = {
         _PUCK,
         _SILENT,
         "can-silence",
-        preflight=replace(OK, why="the first positions are waited for"),
-        idle=replace(OK, why="over before torques are made ready"),
+        preflight=replace(OK, why="the driver waits for the first positions"),
+        idle=replace(OK, why="over before torques are prepared"),
     ),
     "reply-lost-some": _row(OK),
     "reply-late": _row(OK),
@@ -367,7 +367,7 @@ TABLE: dict[str, Row] = {
     "reply-swapped": _row(OK),
     "reply-spoilt": _row(
         OK,
-        # A false first position is the reference of the true ones for a while.
+        # A wrong first position is the reference of the correct ones for a while.
         preflight=_refused(" of 100 exchanges with the arm were incomplete."),
     ),
     "puck-silent": _ending(
@@ -419,7 +419,7 @@ TABLE: dict[str, Row] = {
         _SHARED,
         _IDLE,
         "bus-shared",
-        preflight=Cell(End.ENDED, _SHARED, why="found as soon as the loop runs"),
+        preflight=Cell(End.ENDED, _SHARED, why="detected as soon as the loop runs"),
         idle=Cell(End.ENDED, _SHARED),
     ),
     "puck-doubled": _ending(
@@ -433,7 +433,7 @@ TABLE: dict[str, Row] = {
         replace(OK, why="the arm is active already"),
         preflight=replace(
             _not_ready("The arm was not activated within 120 s."),
-            why="nobody asks for positions yet: the module idles it, and says why",
+            why="no positions requested yet: the module idles the arm and reports why",
         ),
         idle=Cell(End.ENDED, _EARLY, arm=replace(_IDLE, limit_ms=10)),
     ),
@@ -489,8 +489,10 @@ TABLE: dict[str, Row] = {
         _HEARTBEAT,
         _BEAT,
         "pendant-idle",
-        preflight=Cell(End.ENDED, _HEARTBEAT, why="found when the arm becomes active"),
-        idle=Cell(End.ENDED, _HEARTBEAT, why="found when the arm becomes active"),
+        preflight=Cell(
+            End.ENDED, _HEARTBEAT, why="detected when the arm becomes active"
+        ),
+        idle=Cell(End.ENDED, _HEARTBEAT, why="detected when the arm becomes active"),
     ),
     "safety-speed": _module("velocity", Cell(End.ENDED, f"{_MODULE}velocity fault.")),
     "safety-torque": _module(
@@ -511,7 +513,9 @@ TABLE: dict[str, Row] = {
         "The position of motor 3 jumped by ",
         replace(_SILENT, seen="driven", text="UNKNOWN - support it"),
         "position-jump",
-        preflight=Cell(End.ABSENT, why="positions are judged by those before them"),
+        preflight=Cell(
+            End.ABSENT, why="positions are checked against the preceding ones"
+        ),
         idle=_not_ready("Puck 3 has not answered for 100 ms."),
     ),
     "safety-silent": _ending(
@@ -524,12 +528,12 @@ TABLE: dict[str, Row] = {
             "The safety module has not reported its mode for ",
             ("interrupted: safety-silent",),
             Arm(250, "driven", HOLD, "UNKNOWN - support it"),
-            why="the trial has begun before it is known",
+            why="the trial begins before the fault is detected",
         ),
         idle=Cell(
             End.ENDED,
             "The safety module has not reported its mode for ",
-            why="found when torques are made ready",
+            why="detected when torques are prepared",
         ),
     ),
     "safety-disobedient": _row(OK),
@@ -559,7 +563,7 @@ TABLE: dict[str, Row] = {
         recording=Cell(
             End.REPORTED,
             _FLAGGED,
-            why="the trial is over before; its review names the channel",
+            why="the trial ends first; its review names the channel",
         ),
     ),
     "ft-garbled": _sensor(20, _FEW, _NO_FRAME),
@@ -584,8 +588,10 @@ TABLE: dict[str, Row] = {
         Cell(End.REPORTED, "Known-pose residual"),
         tare=Cell(End.REPORTED, "Force varied "),
     ),
-    "ft-reboot": _lost_sensor(_FLAGGED, replace(OK, why="it is set up again")),
-    "ft-clock-jump": _lost_sensor(_FLAGGED, replace(OK, why="the fit begins then")),
+    "ft-reboot": _lost_sensor(_FLAGGED, replace(OK, why="the sensor is set up again")),
+    "ft-clock-jump": _lost_sensor(
+        _FLAGGED, replace(OK, why="the clock fit begins afterwards")
+    ),
     "not-a-number": _ending(
         _NAN,
         Arm(2, "idle", ArmState.IDLE, "idle"),
@@ -600,7 +606,7 @@ TABLE: dict[str, Row] = {
         idle=Cell(
             End.ENDED,
             "Joint 2 would need ",
-            why="found when the arm becomes active; without torque it falls",
+            why="detected when the arm becomes active; without torque it sinks",
             then="Damping does not slow the arm down: kinetic energy",
         ),
         **dict.fromkeys(("ready", "recording", "review"), _WEAK),
@@ -609,9 +615,11 @@ TABLE: dict[str, Row] = {
         "The foot moved at ",
         "foot-speed",
         idle=Cell(
-            End.REPORTED, "The foot moved at ", why="found when the arm is moved"
+            End.REPORTED, "The foot moved at ", why="detected when the arm is moved"
         ),
-        tare=replace(_WEAK, why="a blow that hold may not allow either"),
+        tare=replace(
+            _WEAK, why="a disturbance that may exceed the limits of hold, too"
+        ),
     ),
     "overspeed": _limit(
         "Joint 6 ", "overspeed", preflight=_STAYS, idle=_STAYS, tare=_PUSHED_AWAY
@@ -623,7 +631,7 @@ TABLE: dict[str, Row] = {
         tare=_SLIP_LATER,
         ready=_SLIP_LATER,
         recording=_SLIP,
-        review=replace(OK, why="watched in trials only"),
+        review=replace(OK, why="checked in trials only"),
     ),
     "stall-3-ms": _row(OK),
     "stall-20-ms": _row(
@@ -633,7 +641,7 @@ TABLE: dict[str, Row] = {
             "T01 stopped at",
             ("interrupted: ft-stale",),
             replace(_HELD, limit_ms=20),
-            why="no force was looked at meanwhile",
+            why="no force was checked meanwhile",
         ),
     ),
     "stall-150-ms": _row(
@@ -656,7 +664,7 @@ TABLE: dict[str, Row] = {
             "T01 stopped at",
             ("interrupted: ft-stale",),
             replace(_HELD, limit_ms=150),
-            why="no force was looked at meanwhile",
+            why="no force was checked meanwhile",
         ),
     ),
     "can-silence, heartbeat 1 s": _ending(

@@ -80,7 +80,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "an old position is taken for a new one",
             "busy bus, slow adapter",
             "late and duplicate replies are counted. One cycle in 47 (one in 20 in the preflight) sends no position request: a reply received in it is late by whole cycles",
-            "late and duplicate replies are discarded; the next cycle waits for both replies. Late by whole cycles: hold, then idle once confirmed twice more, within 20 ms; at start: refused",
+            "late and duplicate replies are discarded; the next cycle waits for the late reply and its own. Late by whole cycles: hold, then idle once confirmed twice more, within 20 ms; at start: refused",
             (
                 "reply-late",
                 "reply-doubled",
@@ -562,7 +562,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "as for late positions",
             "slow adapter",
             "the preflight times the exchange and the reply of a puck",
-            "warned",
+            "warning",
             ("reply-late",),
             "",
             (_ARM + "test_waiting_for_a_missing_reply_ends_at_the_deadline",),

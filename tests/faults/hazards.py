@@ -1,6 +1,6 @@
 """Hazards as data: every signal and every kind of its fault.
 
-`python -m tests.faults` prints it; measured values come from bounds.json.
+`python -m tests.attacks hazards` prints it; measured values come from bounds.json.
 """
 
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ from tests.faults.truth import is_within
 HEAD = """
 # Hazards
 
-For every signal: the hazard when it is lost, stuck, drifting, implausible or late; how
-it is detected, the reaction, the bound until then, and the test. Bounds are the worst
-of the recording of a trial and of a move by the arm itself, measured on the simulated
-arm: largest joint speed as a share of the joint's limit, travel of the sole within
-0.5 s, force of the motors on the person who holds the sole. "As without it" means that
-the value does not exceed the one without a fault.
+For every signal: the hazard if it is lost, stuck, drifting, implausible or late, its
+detection, the reaction, the bound until then, and the test. Bounds are the worst of the
+recording of a trial and of an autonomous move, measured on the simulated arm: largest
+joint speed as a share of the joint's limit, travel of the sole within 0.5 s, force of
+the motors on the person who holds the sole. "As without it" means that the value does
+not exceed the one without a fault.
 """
 _S = StepId
 # Steps of `traction commission` by the signal that they verify on the real arm.

@@ -68,7 +68,7 @@ def _attack(fault: str, phase: str, cell: Cell) -> Attack:
 
 
 def _arm_words(cell: Cell) -> str:
-    """Return the words about the arm's reaction and its time."""
+    """Return the reaction of the arm and its time in words."""
     if cell.arm is None:
         return f"the arm {cell.at_rest}"
     return f"{cell.arm.text} within {cell.arm.limit_ms + ALLOWANCE_MS:.0f} ms"
@@ -188,7 +188,7 @@ def check_files(seen: Seen, cell: Cell) -> None:
 
 
 def check_resume(seen: Seen, cell: Cell) -> None:
-    """Check that an incomplete session is completed and a complete one is left."""
+    """Check that an incomplete session is completed and a complete one unchanged."""
     if seen.folder is None:
         return
     done = resume(seen.data)

@@ -12,18 +12,19 @@ _WEIGHED = replace(OK, why=_NO_FORCE)
 _UNLOCKED = Cell(
     End.UNMEASURED,
     "Joint 7 is ",
-    why="joint 7 is not locked while the arm moves: its place tells",
+    why="joint 7 is not locked while the arm moves; its position shows the motion",
 )
 _ASTRAY = Cell(
-    End.UNMEASURED, why="seen where the arm was sent, not how fast it truly goes"
+    End.UNMEASURED, why="detected from the commanded path, not from the true speed"
 )
 _IN_VAIN = Cell(
     End.UNMEASURED,
     " does not turn although the arm is commanded to move.",
-    why="seen when the move turns the motor in vain, at the latest in the next move",
+    why="detected when a commanded motor does not turn, by the next move at the latest",
 )
 _STEP = Cell(
-    End.COMPLETE, why="in a move only the energy is judged; half of 1 J is seen"
+    End.COMPLETE,
+    why="in a move only the energy is checked; the step shows 0.5 J (limit 1 J)",
 )
 _MET = Cell(
     End.UNMEASURED,
@@ -33,12 +34,12 @@ _MET = Cell(
 
 
 def _too_fast(text: str) -> Cell:
-    """Return the cell of an arm that leaves its limits without a hand on it."""
+    """Return the cell of an arm that exceeds its limits with no hand on it."""
     return Cell(
         End.UNMEASURED,
         text,
         arm=Arm(30, "idle", ArmState.IDLE, "idle"),
-        why="no hand is on it: what is too fast may be its own encoder",
+        why="no hand moves the arm: the excess may be an encoder error",
     )
 
 
@@ -61,13 +62,14 @@ _OWN = {
     "second-command": OTHER_REFUSED,
 }
 _LAME = Cell(
-    End.UNMEASURED, why="the arm is idled as it sinks, or a motor turns in vain"
+    End.UNMEASURED,
+    why="the arm is idled as it sinks, or because a motor does not turn as commanded",
 )
 _STOPPING = {End.ENDED, End.REPORTED, End.REDONE, End.SOMEHOW}
 
 
 def _cell(fault: str) -> Cell:
-    """Return the cell of a fault, derived from that during a tare without its own."""
+    """Return the cell of a fault, by default derived from its cell of the tare."""
     if fault in _OWN:
         return _OWN[fault]
     at_tare = TABLE[fault][_TARE]

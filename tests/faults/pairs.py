@@ -1,8 +1,8 @@
 """Two faults in succession: every ordered pair, delay and phase.
 
 For every pair, each verdict that the loop latched is reported; once one of them idles
-the arm, it is not driven again, whatever is pressed at the pendant; the session ends if
-either fault ends it; and no trial is kept in which the motors had no power.
+the arm, no key of the pendant lets it be driven again; the session ends if either fault
+ends it; and no trial is kept in which the motors had no power.
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,7 +24,7 @@ from tests.faults.strikes import strike_of
 
 DELAYS_MS = (0, 20, 60, 100, 140, 200, 500)
 PHASES = ("idle", "tare", "ready", "recording", "review", MOVING)
-_RELEASED_NS = 300 * MS  # after a fault of the circuit a person presses idle, activate
+_RELEASED_NS = 300 * MS  # from a fault of the circuit to the keys idle and activate
 
 
 def _reported(fault: Fault) -> Strike:
@@ -34,22 +34,22 @@ def _reported(fault: Fault) -> Strike:
 
 # Faults of every reaction of the guard, by the name of their row.
 STRIKES: dict[str, Strike] = {
-    # They end a trial, or hold.
+    # End a trial, or hold.
     "contact-force": strike_of("contact-force"),
     "ft-stale": strike_of("ft-stale"),
     "console-silent": _reported(Fault.CONSOLE_SILENT),
     "recorder-silent": _reported(Fault.RECORDER_SILENT),
     "move-refused": _reported(Fault.MOVE_REFUSED),
-    # They damp.
+    # Damp.
     "overspeed": strike_of("overspeed"),
     "joint-limit": strike_of("joint-limit"),
-    # They hold, then idle.
+    # Hold, then idle.
     "puck-silent": strike_of("puck-silent"),
     "can-silence": strike_of("can-silence"),
     "position-jump": strike_of("position-jump"),
     "replies-late": strike_of("replies-late"),
     "safety-silent": strike_of("safety-silent"),
-    # They idle.
+    # Idle.
     "bus-shared": strike_of("bus-shared"),
     "puck-doubled": strike_of("puck-doubled"),
     "not-a-number": strike_of("not-a-number"),
@@ -87,7 +87,7 @@ EVERY_COMMIT = (
     Pair("estop", "console-silent", 20, "review"),
     # A fault that holds, with one that holds and idles later.
     Pair("move-refused", "can-silence", 0, "review"),
-    # While the arm moves by itself.
+    # During an autonomous move.
     Pair("joint-limit", "puck-silent", 20, MOVING),
 )
 
@@ -149,7 +149,7 @@ def _unreported(seen: Seen, latched: Sequence[tuple[int, GuardVerdict]]) -> list
         return [f"a traceback: {output[-600:]}"]
     faults = dict.fromkeys(v.fault for _, v in latched if v.fault is not None)
     unreported = [fault for fault in faults if not _is_reported(fault, output)]
-    return [f"{fault} was not told" for fault in unreported]
+    return [f"{fault} was not reported" for fault in unreported]
 
 
 _OTHER_NAMES = {
@@ -170,7 +170,7 @@ def _has_words(what: str, output: str) -> bool:
 
 
 def _driven_again(seen: Seen, latched: Sequence[tuple[int, GuardVerdict]]) -> list[str]:
-    """Return when the arm got torques again after a verdict that idles."""
+    """Return whether torques were applied again after a verdict that idles."""
     idled = [ns for ns, v in latched if v.action is Action.IDLE]
     if not idled:
         return []
@@ -212,7 +212,7 @@ def _attack(pair: Pair) -> Attack:
     return Attack(
         f"{pair.first}, then {pair.second}",
         f"{pair.delay_ms} ms later, {pair.phase}",
-        "both are told, the stricter reaction stands, nothing is kept without power",
+        "both are reported, the stricter reaction applies, no unpowered trial is kept",
         check,
         RunBy.TEST if pair in EVERY_COMMIT else RunBy.NIGHTLY,
         seconds=240,

@@ -1,4 +1,4 @@
-"""Phases in which a fault may occur: those of a session and a move by the arm."""
+"""Phases in which a fault may occur: those of a session and an autonomous move."""
 
 PHASES = ("preflight", "idle", "tare", "ready", "recording", "review", "end")
-MOVING = "moving"  # a move by the arm between two poses of a calibration
+MOVING = "moving"  # an autonomous move between two poses of a calibration

@@ -32,7 +32,7 @@ from tests.processes.watching import (
 )
 
 TRIES = 5  # a session may stop because the machine stalled
-REACTION = 0.6  # s, from the fault to an arm that holds or is idle
+REACTION = 0.6  # s, from the fault until the arm holds or is idle
 SAFE = {ArmState.HOLD, ArmState.DAMP, ArmState.IDLE}
 BRAKED = {SafetyMode.IDLE, SafetyMode.E_STOP}
 CODES = {
@@ -44,7 +44,7 @@ CODES = {
     End.INTERRUPTED: {130},
     End.KILLED: {-signal.SIGKILL, -signal.SIGTERM, -signal.SIGHUP},
 }
-# For each commit; a killed console is in tests/processes too.
+# For each commit; tests/processes covers a killed console, too.
 DAILY = {
     ("recorder killed", "ready"),
     ("sensor reader killed", "tare"),
@@ -268,7 +268,7 @@ def is_survived(folder, fault, phase, cell):
 
 
 def check_resume(data, cell):
-    """Check that a begun session is completed and leaves no partial trial."""
+    """Check that an interrupted session is completed and leaves no partial trial."""
     if not (data / "sessions").exists():
         return
     done = traction("resume", "--fast", "--operator-script", "auto", "--data", data)

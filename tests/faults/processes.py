@@ -8,12 +8,14 @@ from tests.faults.phases import PHASES
 _STOPPED = Cell(End.STOPPED)
 _LOST = Cell(End.ENDED, " process ended: killed by SIGKILL.")
 _GONE = Cell(End.KILLED)
-_NO_ARM = replace(_GONE, why="nobody has asked for the arm yet")
+_NO_ARM = replace(_GONE, why="the arm has not been requested yet")
 _BEFORE = Cell(End.INTERRUPTED, "Interrupted.", why="there is no session yet")
 
 
 _LEFT_OUT = Cell(
-    End.UNBRACKETED, "No tare at the end", why="everything is kept: only a tare is lost"
+    End.UNBRACKETED,
+    "No tare at the end",
+    why="all trials are kept; only a tare is lost",
 )
 
 

@@ -33,7 +33,7 @@ _AFTERWARDS_NS = 500 * MS
 MOVING_SPEED = 0.3  # rad/s; the move is under way
 _FRESH_NS = 5 * MS  # torques older than two cycles are the last ones
 _PROMPTS = {
-    "tare": (Prompt.LIFT, 0.9),  # at rest since 0.6 s, the mean is being taken
+    "tare": (Prompt.LIFT, 0.9),  # at rest from 0.6 s on; the mean is being taken
     "ready": (Prompt.READY, 0.06),
     "recording": (Prompt.RECORDING, 0.2),
     "review": (Prompt.REVIEW, 0.06),
@@ -146,7 +146,7 @@ def run_with(inject: Strike, phase: str, config: Path, data: Path) -> Seen:
             done = _calibrate(patch, config, data)
         else:
             done = run_short(config, data, "TF", 1)
-        _let_the_world_go_on(scenes[0])
+        _continue_simulation(scenes[0])
     found = [path for path in (data / "sessions").glob("2*") if path.is_dir()]
     return Seen(done, scenes[0], found[0] if found else None, data, logs[0])
 
@@ -172,13 +172,13 @@ def run_whole(
         options = ("--fake", "--fast", "--operator-script", "auto", "--trials", 1)
         more = ("--friction", friction, "--config", config, "--data", data)
         done = traction("run", "TF", *options, *more)
-        _let_the_world_go_on(scenes[0])
+        _continue_simulation(scenes[0])
     folder = next((data / "sessions").glob("2*"))
     return Seen(done, scenes[0], folder, data, logs[0])
 
 
-def _let_the_world_go_on(scene: SimulatedScene) -> None:
-    """Let the simulation go on after the end of the program."""
+def _continue_simulation(scene: SimulatedScene) -> None:
+    """Continue the simulation after the end of the program."""
     rig, clock = scene.rig, scene.clock
     for cycle in range(_AFTERWARDS_NS // PERIOD_NS):
         rig.advance(clock.now_ns() + (cycle + 1) * PERIOD_NS)

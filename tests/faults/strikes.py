@@ -33,7 +33,7 @@ _SPEEDS = np.array(_ARM_SETTINGS.speed_limits)
 
 
 def _tighten(change: Callable[[SimulatedScene], dict[str, object]]) -> Strike:
-    """Return a strike that moves limits to the state of the arm until its repair."""
+    """Return a strike that sets limits the arm exceeds until they are restored."""
 
     def inject(scene: SimulatedScene) -> None:
         cycle = scene.cycle
@@ -51,7 +51,7 @@ def _behind_a_stop(scene: SimulatedScene) -> dict[str, object]:
 
 def _weak(scene: SimulatedScene) -> dict[str, object]:
     tau = list(scene.cycle.limits.torque)
-    tau[_J2] = 0.5  # less than the arm's weight needs
+    tau[_J2] = 0.5  # less than gravity compensation needs
     return {"torque": tuple(tau)}
 
 
@@ -62,7 +62,7 @@ def _swing(scene: SimulatedScene) -> dict[str, object]:
 
 
 def _nonsense(scene: SimulatedScene) -> None:
-    """Let the control law return NaN."""
+    """Make the control law return NaN."""
     nan = np.full(7, np.nan)
     scene.patch.setattr(FootController, "torque", lambda *_: (nan, nan))
 
@@ -84,7 +84,7 @@ def _step_utc(scene: SimulatedScene) -> None:
 
 
 def _no_disk(number: int) -> Strike:
-    """Return a strike after which nothing reaches the disk."""
+    """Return a strike after which no data reach the disk."""
 
     def refuse(_: int) -> None:
         raise OSError(number, os.strerror(number))
@@ -99,11 +99,11 @@ def _transmission(scene: SimulatedScene) -> Transmission:
 
 
 def _step_lie(motor: int) -> Strike:
-    """Return a strike after which the reported position of a motor has a false step.
+    """Return a strike after which the reported position of a motor has a wrong offset.
 
-    The step is the largest that the driver accepts in one cycle, and it stays. It
-    begins in a cycle after one that requested positions: over the cycle without a
-    request, one in 250, the same step seems half as fast.
+    The offset is the largest step that the driver accepts in one cycle, and it stays.
+    It begins in a cycle that follows one with a position request: across the cycle
+    without a request, one in 47, the same step seems half as fast.
     """
 
     def inject(scene: SimulatedScene) -> None:
@@ -124,9 +124,9 @@ def _step_lie(motor: int) -> Strike:
 
 
 def _creeping_lie(motor: int) -> Strike:
-    """Return a strike after which a motor's position creeps away from the truth.
+    """Return a strike after which a motor's reported position drifts.
 
-    It creeps as fast as possible within the guard's limits of joint speed.
+    It drifts as fast as possible within the guard's limits of joint speed.
     """
 
     def inject(scene: SimulatedScene) -> None:
@@ -165,7 +165,7 @@ def _deaf(motor: int) -> Strike:
 
 
 def _wire(motor: int, share: float) -> Strike:
-    """Return a strike after which a motor makes this share of its torque."""
+    """Return a strike after which a motor produces this share of its torque."""
 
     def inject(scene: SimulatedScene) -> None:
         torque = np.eye(7)
@@ -176,12 +176,12 @@ def _wire(motor: int, share: float) -> Strike:
 
 
 def _say(node: int, name: str, value: int) -> Strike:
-    """Return a strike after which a puck has another value of a property."""
+    """Return a strike after which a puck has a different value of a property."""
     return lambda scene: scene.rig.network.set_property(node, name, value)
 
 
 def _late(late_ns: int) -> Strike:
-    """Return a strike after which every reply is late, for ever."""
+    """Return a strike after which every reply is late permanently."""
 
     def inject(scene: SimulatedScene) -> None:
         for node in MOTOR_NODES:
@@ -198,7 +198,7 @@ def _let_go(scene: SimulatedScene) -> None:
 
 
 def _drag(scene: SimulatedScene) -> None:
-    """Let the person pull the foot away against the arm."""
+    """Make the person pull the foot away against the arm."""
     scene.rig.plant.hand.carry(_FAR_AWAY)
 
 

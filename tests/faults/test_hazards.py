@@ -75,7 +75,7 @@ def test_a_hazard_names_existing_tests_and_its_bound(row):
 def test_every_fault_of_the_matrix_is_a_cause_of_some_hazard():
     named = {fault for row in hazards() for fault in row.faults}
     assert named <= set(TABLE)
-    # A mere warning or a motion of the person who leads the arm is no lost signal.
+    # A warning, or a motion caused by the person leading the arm, is not a lost signal.
     assert set(TABLE) - named == {
         "nothing",
         "hand-gone",

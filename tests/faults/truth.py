@@ -21,7 +21,7 @@ MS = 1_000_000
 WINDOW_NS = 500 * MS  # travel is measured for this time after a fault
 BLOW_NS = 150 * MS  # a blow to a joint is over after this
 SPEED_LIMITS = np.array([1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0])  # rad/s, of rig.toml
-BLOWS = {"overspeed": 6.0, "foot-speed": 5.0}  # rad/s that the fault itself gives
+BLOWS = {"overspeed": 6.0, "foot-speed": 5.0}  # rad/s added by the fault itself
 _PERIOD_NS = 2 * MS
 _LATEST_NS = 3_000 * MS  # idle or rest after this time is not due to the fault
 _STILL, _STANDS_NS = 0.03, 100 * MS  # m/s of a sole at rest, for this time
@@ -33,14 +33,14 @@ class TrueMotion:
 
     Attributes:
         speed: largest joint speed as a share of the joint's limit in rig.toml.
-        joint: the joint that had it, 1-7.
-        travel: largest distance of the sole from its first place within 0.5 s [m].
-        drive: largest force that the motors, beyond the arm's weight, put on the person
+        joint: the joint with that speed, 1-7.
+        travel: largest distance of the sole from its initial position within 0.5 s [m].
+        drive: largest force of the motors, beyond gravity compensation, on the person
             who holds the sole [N].
         hand: largest force between the arm and the operator's hand [N].
         sole: largest speed of the sole within 0.5 s [m/s].
         idle_ms: when all windings were shorted [ms]; None = not within 3 s.
-        rest_ms: when the sole began to stand for 0.1 s [ms]; None = not within 3 s.
+        rest_ms: when the sole came to rest for 0.1 s [ms]; None = not within 3 s.
     """
 
     speed: float
@@ -77,37 +77,37 @@ LYING = Promise(
     speed=2.0,
     travel=0.2,
     drive=100.0,
-    why="speed is seen through the encoder that lies: the guard bounds what it "
-    "believes, the driver how fast a lie may grow, so the truth has twice the limit; "
-    "the dampers brake a speed that is none for the 50 ms until the arm holds",
+    why="the speed is measured by the faulty encoder: the guard limits the reported "
+    "speed, the driver the growth of the error, so that the true speed can reach twice "
+    "the limit; a spurious velocity is damped for the 50 ms until the arm holds",
 )
 TWISTED = Promise(
     speed=2.0,
-    why="a person twists the foot with 1.2 N m, nearly all that the motor of joint 7 "
-    "may have; the lock gives way and the arm holds without it",
+    why="a person twists the foot with 1.2 N m, nearly the torque limit of the motor "
+    "of joint 7; the lock yields and the arm holds without it",
 )
 LIMP = Promise(
     speed=1.5,
     travel=0.1,
-    why="a motor whose puck restarted has no torque: its joints sink until the arm is "
-    "idle",
+    why="after its puck restarted a motor has no torque: its joints sink until the "
+    "arm is idle",
 )
 DEAD = Promise(
     speed=1.5,
     drive=110.0,
-    why="a motor without torque leaves its joints to the hand, which bears them, or "
-    "they sink until the arm is idle",
+    why="the hand supports the joints of a motor without torque, or they sink until "
+    "the arm is idle",
 )
 LATE = Promise(
     travel=0.1,
     drive=70.0,
-    why="the arm holds by positions of three cycles ago until a cycle that asks for "
-    "none shows it, which is one in 47, and for the 20 ms that confirm it",
+    why="the arm holds with positions that are three cycles old until the one cycle in "
+    "47 without a request reveals it, and for the 20 ms of the confirmation",
 )
 STUCK = Promise(
     speed=1.75,
-    why="a motor whose encoder stands still in a move is pulled until its torque would "
-    "move it for certain; an arm almost without friction goes some way meanwhile",
+    why="a motor whose encoder freezes in a move is driven until its torque would "
+    "certainly move it; an arm with almost no friction travels meanwhile",
 )
 STOPPING = Promise(travel=0.1)
 
@@ -146,7 +146,7 @@ class TruthLog:
 
     Attributes:
         plant: the simulated arm.
-        tool: below the wrist.
+        tool: the tool below the wrist.
         drive: torques of the motors at the joints [N m], shape (7,).
         hand: force of the operator's hand [N].
     """
@@ -204,7 +204,7 @@ class TruthLog:
 
 
 def _stands(pace):
-    """Return the cycles in which the sole begins to rest, shape (n,)."""
+    """Return the cycles in which the sole comes to rest, shape (n,)."""
     window = _STANDS_NS // _PERIOD_NS
     moves = np.concatenate([pace > _STILL, np.ones(window - 1, bool)])
     return ~sliding_window_view(moves, window).any(axis=1)
@@ -259,11 +259,11 @@ def _noting(step, log: TruthLog):
 
 
 def _drive(model: ArmModel, q, tau, is_free) -> float:
-    """Return the largest force at the sole of torques beyond the weight [N]."""
+    """Return the largest force at the sole beyond gravity compensation [N]."""
     worst = 0.0
     for row, torque in zip(q[is_free], tau[is_free], strict=True):
         if not torque.any():
-            continue  # no power: nothing drives it
+            continue  # no power: the motors exert no force
         excess = torque - model.gravity(row)
         J = model.sole_jacobian(row)[:3]
         force = np.linalg.lstsq(J.T, excess, rcond=0.05)[0]
