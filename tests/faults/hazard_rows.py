@@ -35,7 +35,7 @@ ROWS: dict[str, dict[str, Fields]] = {
         "lost": (
             "torques for an old position continue",
             "loose connector; puck in reset or without power",
-            "from the fifth cycle without all seven replies",
+            "fifth cycle without all seven replies",
             "no torques are sent meanwhile; hold after 10 ms, idle after 50 ms",
             ("reply-lost", "reply-lost-10", "puck-silent", "puck-reboot"),
             "",
@@ -58,7 +58,7 @@ ROWS: dict[str, dict[str, Fields]] = {
         "drifting": (
             "gravity compensation for a wrong pose; damping of a spurious velocity",
             "slipping encoder magnet, lost counts",
-            "foot speed, joint speed or joint limit, whichever is exceeded first; in a move also the position relative to the path",
+            "foot speed, joint speed or joint limit, whichever is exceeded first; in a move also the deviation from the commanded position",
             "damp; idle in a move",
             _CREEPS,
             "drift slower than every speed limit is not detected and leaves the zero wrong",

@@ -15,7 +15,8 @@ _UNLOCKED = Cell(
     why="joint 7 is not locked while the arm moves; its position shows the motion",
 )
 _ASTRAY = Cell(
-    End.UNMEASURED, why="detected from the commanded path, not from the true speed"
+    End.UNMEASURED,
+    why="detected by the deviation from the reference, not by the true speed",
 )
 _IN_VAIN = Cell(
     End.UNMEASURED,

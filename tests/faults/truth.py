@@ -107,7 +107,7 @@ LATE = Promise(
 STUCK = Promise(
     speed=1.75,
     why="a motor whose encoder freezes in a move is driven until its torque would "
-    "certainly move it; an arm with almost no friction travels meanwhile",
+    "certainly move it; an arm with almost no friction moves some way meanwhile",
 )
 STOPPING = Promise(travel=0.1)
 
