@@ -23,7 +23,7 @@ from tests.faults.truth import Promise, TrueMotion
 COLUMNS = (*PHASES, MOVING)
 BOUND_PHASES = ("recording", MOVING)
 PATH = Path(__file__).with_name("bounds.json")
-# Machines round differently, and the motion before a fault may change a little.
+# Rounding differs between machines; the motion before a fault may change slightly.
 _SHARE, _SLACK = 1.25, (0.05, 0.005, 3.0, 10.0)
 
 
@@ -68,7 +68,7 @@ def read_bounds() -> dict[str, dict[str, PrintedBound]]:
 
 
 def _rounded(motion: TrueMotion) -> list[float | None]:
-    """Return the values with two or three decimals, never smaller than they are."""
+    """Return the values rounded up to two or three decimals."""
     return [
         _up(motion.speed, 0.01),
         motion.joint,
@@ -105,7 +105,7 @@ def main(part: str) -> None:
 
 
 def _write(rows: dict[str, dict[str, list[float | None]]]) -> None:
-    """Write one line a cell, in the order of the table."""
+    """Write one line per cell, in the order of the table."""
     order = dict.fromkeys(fault for fault, _, _ in cells_of_all())
     known = {
         fault: {p: rows[fault][p] for p in BOUND_PHASES if p in rows[fault]}

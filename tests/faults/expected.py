@@ -58,12 +58,12 @@ class Cell:
 
     Attributes:
         end: how the command ends.
-        text: words of the message.
-        rejected: reasons of the rejected attempts.
-        arm: its immediate reaction; None = no reaction.
-        at_rest: the final state of the arm by its pucks.
-        why: the reason that the cell cannot exist, or a remark on it.
-        then: words of a second message, where one fault causes another.
+        text: part of the message.
+        rejected: reasons for the rejected attempts.
+        arm: immediate reaction of the arm; None = no reaction.
+        at_rest: final state of the arm as seen by the pucks.
+        why: reason why the cell cannot exist, or a remark.
+        then: part of a second message, where one fault causes another.
     """
 
     end: End
@@ -77,17 +77,17 @@ class Cell:
 
 Row = tuple[Cell, ...]
 OK = Cell(End.COMPLETE)
-NO_LOOP = Cell(End.ABSENT, why="the loop does not run yet")
+NO_LOOP = Cell(End.ABSENT, why="the control loop is not running yet")
 UNSEEN = Cell(
     End.COMPLETE,
     why="not detected while the sole is at rest; motors 2 to 6 end a trial after 60 mm",
 )
-OTHER_REFUSED = Cell(End.COMPLETE, why="the other command is refused (arm-busy)")
+OTHER_REFUSED = Cell(End.COMPLETE, why="the second command is refused (arm-busy)")
 AT_REVIEW = ("session ended at the review",)
 
 
 def _row(cell: Cell, **others: Cell) -> Row:
-    """Return a row with `cell` in every phase but those of `others`."""
+    """Return a row with `cell` in every phase except those of `others`."""
     assert set(others) <= set(PHASES)
     return tuple(others.get(phase, cell) for phase in PHASES)
 
@@ -133,7 +133,7 @@ _IN_STOP = replace(
 
 
 def _module(word: str, idle: Cell) -> Row:
-    """Return the row of an immediate fault of a monitor of the safety module."""
+    """Return the row of a fault that a monitor of the safety module reports at once."""
     text = f"{_MODULE}{word} fault."
     resent = replace(OK, why="the module's limits are written again at start")
     return _ending(text, _IDLE, "pendant-idle", preflight=resent, idle=idle)
@@ -146,7 +146,7 @@ def _sensor(limit_ms: float, waits: str, preflight: Cell, **others: Cell) -> Row
     waiting = Cell(End.REPORTED, waits)
     phases = {
         "preflight": preflight,
-        "ready": replace(redone, arm=None, why="stops as soon as it is recorded"),
+        "ready": replace(redone, arm=None, why="stopped as soon as recording begins"),
         "recording": redone,
         "review": replace(waiting, why="the trial is complete; the last tare waits"),
     }
@@ -170,7 +170,7 @@ def _lost_sensor(waits: str, preflight: Cell) -> Row:
 
 
 def _limit(text: str, why: str, **others: Cell) -> Row:
-    """Return the row of a limit of the guard on the arm's motion."""
+    """Return the row of a violated motion limit of the guard."""
     warned = Cell(End.REPORTED, text, arm=_DAMPED)
     phases = {
         "preflight": NO_LOOP,
@@ -234,7 +234,7 @@ _PUSHED_AWAY = Cell(
     arm=Arm(10, "idle", ArmState.IDLE, "idle"),
     why="the arm is already in hold and is pushed away",
 )
-_BRAKED = Cell(End.ABSENT, why="joint 7 is damped like the others")
+_BRAKED = Cell(End.ABSENT, why="joint 7 is damped like the other joints")
 _SLIP = Cell(
     End.REDONE,
     "Joint 7 moved",
@@ -279,7 +279,7 @@ def _late() -> Row:
 
 def _wrong_property(name: str, puck: int) -> Row:
     """Return the row of a puck with a wrong property from the start."""
-    later = Cell(End.ABSENT, why="read at every start; later: puck-changed")
+    later = Cell(End.ABSENT, why="read at every start; a later change is puck-changed")
     return _row(later, preflight=_refused(f"{name} of puck {puck} is "))
 
 
@@ -317,11 +317,11 @@ _EARLY_ANEW = _not_ready("The arm was not activated within 120 s.")
 _DISOBEYS = "does not follow its commands"
 # The modes and torques of all pucks are requested within 0.12 s.
 _CAUGHT = replace(_IDLE, limit_ms=130)
-_SET_ANEW = replace(OK, why="the arm's activation sets the mode of every puck")
+_SET_ANEW = replace(OK, why="activation sets the mode of every puck")
 
 
 def _disobeying(later: Cell) -> Row:
-    """Return the row of a puck that no longer obeys.
+    """Return the row of a puck that ignores commands.
 
     `later`: the outcome of the fault if the arm is not yet active.
     """
@@ -430,7 +430,7 @@ TABLE: dict[str, Row] = {
         idle=Cell(End.ENDED, _TWICE),
     ),
     "early-activation": _row(
-        replace(OK, why="the arm is active already"),
+        replace(OK, why="the arm is already active"),
         preflight=replace(
             _not_ready("The arm was not activated within 120 s."),
             why="no positions requested yet: the module idles the arm and reports why",
@@ -482,8 +482,8 @@ TABLE: dict[str, Row] = {
         "The pendant or the safety module put the arm to idle",
         _IDLE,
         "pendant-idle",
-        preflight=replace(OK, why="the arm is idle already"),
-        idle=replace(OK, why="the arm is idle already"),
+        preflight=replace(OK, why="the arm is already idle"),
+        idle=replace(OK, why="the arm is already idle"),
     ),
     "safety-heartbeat": _ending(
         _HEARTBEAT,
@@ -545,7 +545,7 @@ TABLE: dict[str, Row] = {
         idle=_NEVER_SEEN_ACTIVE,
     ),
     **{f"lie-of-motor-{motor}": _lying(motor) for motor in range(1, 7)},
-    # The lock pushes joint 7 back with nearly its largest torque.
+    # The lock pushes joint 7 back with almost its maximum torque.
     "lie-of-motor-7": _row(
         OK,
         recording=Cell(End.REDONE, _ASKED, ("interrupted: torque-limit",), _DAMPED),
@@ -571,13 +571,13 @@ TABLE: dict[str, Row] = {
         0,
         _FLAGGED,
         Cell(End.REPORTED, _FLAGGED),
-        ready=replace(_BEYOND, arm=None, why="stops as soon as it is recorded"),
+        ready=replace(_BEYOND, arm=None, why="stopped as soon as recording begins"),
         recording=_BEYOND,
     ),
     "contact-force": _row(
         Cell(End.REPORTED, "Known-pose residual"),
         tare=Cell(End.REPORTED, "Force varied "),
-        ready=replace(_LOADED, arm=None, why="stops as soon as it is recorded"),
+        ready=replace(_LOADED, arm=None, why="stopped as soon as recording begins"),
         recording=_LOADED,
     ),
     "ft-not-a-number": _sensor(
@@ -682,7 +682,7 @@ TABLE: dict[str, Row] = {
 
 
 def cells() -> list[tuple[str, str, Cell]]:
-    """Return (fault, phase, outcome) of every cell that can exist."""
+    """Return (fault, phase, outcome) of every possible cell."""
     return [
         (fault, phase, cell)
         for fault, row in TABLE.items()

@@ -1,6 +1,6 @@
-"""The fault matrix: every fault in every phase, through the whole program.
+"""The fault matrix: every fault in every phase, run through the whole program.
 
-On stepped time, it checks the messages, the arm, the files and the resumed session.
+In stepped time, it checks the messages, the arm, the files and the resumed session.
 """
 
 import re
@@ -16,7 +16,7 @@ from tests.faults.rehearse import Seen, SimulatedScene, resume, run_with
 from tests.faults.strikes import strike_of
 from tests.faults.truth import is_within, promise_of
 
-ALLOWANCE_MS = 20.0  # beyond the fault's own limit
+ALLOWANCE_MS = 20.0  # beyond the detection limit of the fault
 CODES = {
     End.COMPLETE: 0,
     End.REFUSED: 3,
@@ -51,11 +51,11 @@ WHOLE_TRIALS = {
 }
 
 
-_OF_ANOTHER_MOTOR = re.compile(r"-[13-7]$")  # motor 2 stands for all of them
+_OF_ANOTHER_MOTOR = re.compile(r"-[13-7]$")  # motor 2 represents the others
 
 
 def fault_attacks() -> list[Attack]:
-    """Return every cell of the matrix that can exist."""
+    """Return every possible cell of the matrix."""
     return [_attack(*row) for row in cells_of_all()]
 
 
@@ -70,12 +70,13 @@ def _attack(fault: str, phase: str, cell: Cell) -> Attack:
 def _arm_words(cell: Cell) -> str:
     """Return the reaction of the arm and its time in words."""
     if cell.arm is None:
-        return f"the arm {cell.at_rest}"
-    return f"{cell.arm.text} within {cell.arm.limit_ms + ALLOWANCE_MS:.0f} ms"
+        return f"arm: {cell.at_rest} at the end"
+    reaction = cell.arm.text or cell.arm.seen
+    return f"arm: {reaction}, within {cell.arm.limit_ms + ALLOWANCE_MS:.0f} ms"
 
 
 def run_by(fault: str, phase: str) -> RunBy:
-    """Return the command that runs a cell: each commit gets one of every kind."""
+    """Return the command that runs a cell; each commit runs one of every kind."""
     if (fault, phase) in DAILY:
         return RunBy.TEST
     is_covered = _OF_ANOTHER_MOTOR.search(fault) or fault in {name for name, _ in DAILY}
@@ -84,8 +85,8 @@ def run_by(fault: str, phase: str) -> RunBy:
 
 
 def _phase_in_turn(fault: str) -> str:
-    """Return the phase in which CI runs a fault; it differs between neighbours."""
-    if fault == "suspended-1-s":  # other phases take a minute
+    """Return the phase in which CI runs a fault; adjacent rows differ."""
+    if fault == "suspended-1-s":  # the other phases take a minute
         return "recording"
     phases = [phase for name, phase, _ in cells_of_all() if name == fault]
     return phases[list(TABLE).index(fault) % len(phases)]
@@ -111,7 +112,7 @@ def check_words(seen: Seen, cell: Cell) -> None:
     done = seen.done
     assert "Traceback" not in done.err + done.out
     if cell.end is End.SOMEHOW:
-        assert done.code in {0, 4, 5}, done.err  # 5: no tare, given up
+        assert done.code in {0, 4, 5}, done.err  # 5: abandoned without a tare
         return
     if cell.end is End.UNMEASURED:
         assert done.code in {3, 4}, done.err
@@ -137,7 +138,7 @@ def check_words(seen: Seen, cell: Cell) -> None:
 
 
 def check_arm(seen: Seen, cell: Cell) -> None:
-    """Check the arm, as its pucks see it, against the table."""
+    """Check the arm, as seen by its pucks, against the table."""
     scene = seen.scene
     assert scene.arm == cell.at_rest
     if cell.end in NOTHING:
@@ -158,7 +159,7 @@ def reached_ms(scene: SimulatedScene, arm: Arm) -> float | None:
 
 
 def check_truth(seen: Seen, fault: str, phase: str, cell: Cell) -> None:
-    """Check the true motion of the arm against the limits and the printed bounds."""
+    """Check the true motion of the arm against its limits and the printed bounds."""
     scene = seen.scene
     motion = seen.truth.since(scene.struck_ns, fault)
     assert is_within(motion, promise_of(fault, cell)), motion

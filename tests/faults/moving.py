@@ -1,4 +1,4 @@
-"""The expected outcome of each fault while the arm moves by itself in a calibration."""
+"""The expected outcome of each fault during a calibration move of the arm."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ from tests.faults.expected import HOLD, OK, OTHER_REFUSED, TABLE, Arm, Cell, End
 from tests.faults.phases import PHASES
 
 _TARE = PHASES.index("tare")
-_NO_FORCE = "no force is read while the arm is weighed"
+_NO_FORCE = "no force is read while the arm's weight is measured"
 _WEIGHED = replace(OK, why=_NO_FORCE)
 _UNLOCKED = Cell(
     End.UNMEASURED,

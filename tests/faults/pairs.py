@@ -32,7 +32,7 @@ def _reported(fault: Fault) -> Strike:
     return lambda scene: scene.cycle.report(verdict_for(fault))
 
 
-# Faults of every reaction of the guard, by the name of their row.
+# Faults that cover every reaction of the guard, by the name of their row.
 STRIKES: dict[str, Strike] = {
     # End a trial, or hold.
     "contact-force": strike_of("contact-force"),
@@ -165,7 +165,7 @@ def _is_reported(fault: Fault, output: str) -> bool:
 
 
 def _has_words(what: str, output: str) -> bool:
-    """Return whether the longest fixed part of a message is in the output."""
+    """Return whether the output contains the longest fixed part of a message."""
     return max((words for words, *_ in Formatter().parse(what)), key=len) in output
 
 
@@ -182,7 +182,7 @@ def _driven_again(seen: Seen, latched: Sequence[tuple[int, GuardVerdict]]) -> li
 def _not_ended(seen: Seen, latched: Sequence[tuple[int, GuardVerdict]]) -> list[str]:
     code = seen.done.code
     is_over = any(verdict.ends_session for _, verdict in latched)
-    # After an abandoned tare, or a missing last one, the exit code differs.
+    # The exit code differs after an abandoned tare or without the final one.
     is_expected = code in {3, 4} or (not is_over and code in {0, 5})
     is_at_the_end = code == 0 and "No tare at the end" in seen.done.out
     return [] if is_expected or is_at_the_end else [f"exit code {code}"]

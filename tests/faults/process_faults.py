@@ -1,4 +1,4 @@
-"""Processes, signals and the disk in every phase of a session, on the wall clock."""
+"""Faults of processes, signals and the disk in every phase, on the wall clock."""
 
 import contextlib
 import os
@@ -116,7 +116,7 @@ class SimulatedScene:
                     os.read(self.terminal, 4096)
 
     def close_terminal(self):
-        """Close the window; a second call does nothing."""
+        """Close the terminal; a second call does nothing."""
         if not self.is_closing:
             self.is_closing = True
             wait(0.1)  # the reader has stopped
@@ -166,7 +166,7 @@ def waiting_in(phase, folder, fault):
 
 
 def codes_of(fault, cell):
-    """Return the exit codes; a second Ctrl-C may follow the end of the session."""
+    """Return the allowed exit codes; the second SIGINT may arrive after the end."""
     return CODES[cell.end] | ({130} if fault == "SIGINT twice" else set())
 
 
@@ -184,7 +184,7 @@ def arrive(scene, phase):
         return False
     children = children_of(seen.process.pid)
     seen.pids = {name: children[short] for name, short in NAMES.items()}
-    wait(0.5)  # the session is in the middle of the phase
+    wait(0.5)  # well inside the phase
     if phase != "preflight":
         seen.attach()
     return True
@@ -216,7 +216,7 @@ def is_safe(seen):
 
 
 def process_attacks() -> list[Attack]:
-    """Return every fault of a process in each phase."""
+    """Return every process fault in every phase."""
     return [
         _attack(fault, phase, cell)
         for fault, row in TABLE.items()
@@ -234,7 +234,7 @@ def _attack(fault: str, phase: str, cell: Cell) -> Attack:
     return Attack(
         fault,
         phase,
-        f"{cell.end.value}; the arm holds or is idle within {REACTION} s",
+        f"{cell.end.value}; arm holding or idle within {REACTION} s",
         check,
         RunBy.CI if (fault, phase) in DAILY else RunBy.NIGHTLY,
         seconds=400,

@@ -24,7 +24,7 @@ from wam.driver.settings import ArmSettings
 from wam.driver.transmission import Transmission
 
 _J2, _J6 = 1, 5
-_ALMOST = 0.95  # of what driver and guard accept
+_ALMOST = 0.95  # share of the limits of driver and guard
 _PERIOD = 0.002  # s
 _LONG_BEAT_NS = 1000 * MS
 _ARM_SETTINGS = ArmSettings()
@@ -192,7 +192,7 @@ def _late(late_ns: int) -> Strike:
 
 
 def _let_go(scene: SimulatedScene) -> None:
-    """Let the person release the arm, which is then unsupported."""
+    """Make the person release the arm, which is then unsupported."""
     scene.rig.plant.hand.let_go()
     scene.rig.plant.support = Support.NONE
 

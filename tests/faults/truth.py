@@ -1,7 +1,7 @@
-"""The true motion of the simulated arm after a fault, and its promised bounds.
+"""The true motion of the simulated arm after a fault, and its guaranteed bounds.
 
-Nothing here comes from the driver: positions, velocities, torques and forces are those
-of the simulated plant, every 2 ms, from the fault to the end of the command.
+Positions, velocities, torques and forces are those of the simulated plant, not the
+driver's estimates: every 2 ms, from the fault to the end of the command.
 """
 
 from dataclasses import dataclass, field
@@ -24,7 +24,7 @@ SPEED_LIMITS = np.array([1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0])  # rad/s, of rig.to
 BLOWS = {"overspeed": 6.0, "foot-speed": 5.0}  # rad/s added by the fault itself
 _PERIOD_NS = 2 * MS
 _LATEST_NS = 3_000 * MS  # idle or rest after this time is not due to the fault
-_STILL, _STANDS_NS = 0.03, 100 * MS  # m/s of a sole at rest, for this time
+_STILL, _STANDS_NS = 0.03, 100 * MS  # speed [m/s] and time of a sole at rest
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,10 +55,10 @@ class TrueMotion:
 
 @dataclass(frozen=True, slots=True)
 class Promise:
-    """Bounds of a true motion, with some of the fields of `TrueMotion`.
+    """Bounds of the true motion; fields as in `TrueMotion`.
 
     Attributes:
-        why: the reason for bounds other than those of most faults.
+        why: reason for bounds that differ from the default.
     """
 
     speed: float = 1.0
@@ -71,7 +71,7 @@ class Promise:
 FALLING = Promise(
     speed=np.inf,
     travel=np.inf,
-    why="the arm is not driven: without power it sinks, and a person has to support it",
+    why="without power the arm is not driven and sinks; a person has to support it",
 )
 LYING = Promise(
     speed=2.0,
@@ -113,7 +113,7 @@ STOPPING = Promise(travel=0.1)
 
 
 def promise_of(fault: str, cell: Cell) -> Promise:
-    """Return the promised bounds of a fault with the outcome `cell`."""
+    """Return the guaranteed bounds of a fault with the outcome `cell`."""
     if cell.at_rest == NO_POWER:
         return FALLING
     if fault.startswith("creep"):
@@ -169,7 +169,7 @@ class TruthLog:
         self.rows.append(np.concatenate(parts))
 
     def since(self, struck_ns: int, fault: str) -> TrueMotion:
-        """Return the largest values from `struck_ns` on without the blow of `fault`."""
+        """Return the largest values after `struck_ns`, without the blow of `fault`."""
         t_ns = np.array(self.t_ns)
         begin = max(int(np.searchsorted(t_ns, struck_ns)) - 1, 0)
         rows, after_ns = np.array(self.rows[begin:]), t_ns[begin:] - struck_ns
@@ -211,7 +211,7 @@ def _stands(pace):
 
 
 def _first_ms(after_ns, happened) -> float | None:
-    """Return the first time after the fault when `happened` is true [ms]."""
+    """Return the time from the fault to the first true value of `happened` [ms]."""
     when = after_ns[happened & (after_ns >= 0)]
     return float(when[0]) / MS if len(when) and when[0] <= _LATEST_NS else None
 
