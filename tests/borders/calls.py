@@ -1,4 +1,4 @@
-"""Calls from a notebook, and names of files, at the border of valid input."""
+"""Calls of the Python interface and file names at the border of valid input."""
 
 import os
 from collections.abc import Callable
@@ -38,7 +38,7 @@ def _refused(given: str, call: Callable[[Path], Any], says: str) -> Border:
 
 
 def _found(given: str, pattern: str) -> Border:
-    """A row of one file that is given by `pattern`, below the home folder."""
+    """A row of a file in the home folder, given by `pattern`."""
 
     def act(folder: Path) -> Answer:
         (folder / "trial.csv").write_text(text())
@@ -71,7 +71,7 @@ def _trials(folder: Path) -> Any:
 CALLS: tuple[Border, ...] = (
     _refused("quantiles([1.5])", lambda _: _NORMAL.quantiles([1.5]), "from 0 to 1"),
     _refused(
-        "quantiles([1.5]) of a new trial",
+        "quantiles([1.5]) of the prediction for a new trial",
         lambda _: _MIXED.quantiles([1.5]),
         "from 0 to 1",
     ),
@@ -84,21 +84,21 @@ CALLS: tuple[Border, ...] = (
     ),
     _refused('predict(F_n="3")', lambda _: points_of("3", 0.1), "F_n = '3' is neither"),
     _refused(
-        "predict of a NaN", lambda _: points_of(3.0, np.nan), "v_t has to be finite"
+        "predict with NaN", lambda _: points_of(3.0, np.nan), "v_t has to be finite"
     ),
     _refused(
-        "predict of three loads and two velocities",
+        "predict with three loads and two velocities",
         lambda _: points_of([1.0, 2.0, 3.0], [0.1, 0.2]),
         "one shape",
     ),
-    Border("a terrain's predict of arrays", Outcome.READ, "", _many),
+    Border("predict of a terrain with arrays", Outcome.READ, "", _many),
     _refused(
         'compare(trials, "tustim")',
         lambda f: tr.compare([*_trials(f), *_trials(f)], "tustim"),
         "tustim",
     ),
     _refused(
-        "load_tables of a dictionary of arrays",
+        "load_tables with a dictionary of arrays",
         lambda _: tr.load_tables({"t": _ONE}),  # pyright: ignore
         "is neither a file name nor a list",
     ),
@@ -118,16 +118,16 @@ CALLS: tuple[Border, ...] = (
         "is no decimal mark",
     ),
     _found("~/trial.csv", "~/trial.csv"),
-    _found("a pattern, *.csv", "{folder}/*.csv"),
+    _found("pattern *.csv", "{folder}/*.csv"),
     _refused(
-        "a pattern that no file fits",
+        "pattern that matches no file",
         lambda f: load_tables([f / "*.csv"]),
         "no file matches this pattern",
     ),
     _refused(
-        "a name that is not there",
+        "file that does not exist",
         lambda f: load_tables([f / "gone.csv"]),
         "cannot be read",
     ),
-    _refused("a folder without tables", lambda f: load_tables([f]), "cannot be read"),
+    _refused("folder without tables", lambda f: load_tables([f]), "cannot be read"),
 )

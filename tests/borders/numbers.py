@@ -60,7 +60,7 @@ def _gap(seconds: float) -> tuple[list[list[str]], np.ndarray]:
 def _pushed(
     v: float = 1.0, F_n: float = 1.0, F_t: float = 1.0
 ) -> tuple[str, np.ndarray]:
-    """A table of a foot that slides, with factors, and its numbers."""
+    """A table of a sliding foot, scaled by factors, and its numbers."""
     k = np.arange(200)
     rows = np.column_stack(
         [
@@ -84,65 +84,70 @@ _SENTINELS[20:22, 2] = 9999
 
 NUMBERS: tuple[Border, ...] = (
     refused(
-        "points that group thousands beside decimal commas",
+        "points as thousands separators, with decimal commas",
         _GERMAN,
         "line 2, column F_n: '22.051' stands where a number with decimal mark ','",
         separator=";",
         decimal=",",
     ),
     refused(
-        "quoted 22,051 beside 0.0799",
+        "quoted 22,051 next to 0.0799",
         _QUOTED,
         "'22,051' stands where a number with decimal mark '.'",
     ),
     refused(
-        "both marks in one number",
+        "thousands and decimal separators in one number",
         _SEMI.replace("22,051", "1.022,051"),
         "'1.022,051' stands where a number with decimal mark ','",
         separator=";",
         decimal=",",
     ),
     refused(
-        "an apostrophe between thousands",
+        "apostrophe as thousands separator",
         text(_scaled(2, 1e3), names=_names(F_n="mN")).replace("22051.0", "22'051"),
         '"22\'051" stands where a number',
     ),
     refused(
-        "a blank between thousands",
+        "space as thousands separator",
         text(with_column(2, lambda k, old: old.replace(".", " "))),
         "'22 051' stands where a number",
     ),
     refused(
-        "points, with --decimal ,",
+        "decimal points, with --decimal ,",
         text(),
         "a number with decimal mark ','",
         decimal=",",
     ),
-    table("exponents", text(with_column(1, lambda k, old: f"{float(old):.6e}"))),
+    table(
+        "exponent notation", text(with_column(1, lambda k, old: f"{float(old):.6e}"))
+    ),
     refused(
-        "a word",
+        "word instead of a number",
         text(with_cell(17, 1, "fast")),
         "line 19, column v_t: 'fast' stands where a number",
     ),
     refused(
-        "a hexadecimal number",
+        "hexadecimal number",
         text(with_cell(3, 2, "0x1f")),
         "line 5, column F_n: '0x1f'",
     ),
     refused(
-        "digits with an underscore",
+        "underscore between digits",
         text(with_cell(3, 2, "22_051")),
         "line 5, column F_n: '22_051'",
     ),
     refused(
-        "OVERFLOW in the place of a number",
+        "OVERFLOW instead of a number",
         text(with_cell(3, 3, "OVERFLOW")),
         "line 5, column F_t: 'OVERFLOW'",
     ),
     table(
-        "v_t in cm/s by the header", text(_scaled(1, 100.0), names=_names(v_t="cm/s"))
+        "v_t in cm/s, stated in the header",
+        text(_scaled(1, 100.0), names=_names(v_t="cm/s")),
     ),
-    table("v_t in um/s by --unit", text(_scaled(1, 1e6)), units={"v_t": "um/s"}),
+    table(
+        "v_t in um/s, stated by --unit", text(_scaled(1, 1e6)), units={"v_t": "um/s"}
+    ),
     table(
         "F_n in kgf, F_t in gf",
         text(
@@ -183,27 +188,27 @@ NUMBERS: tuple[Border, ...] = (
         units={"v_t": "m/s"},
     ),
     flagged(
-        "v_t in mm/s that nothing states",
+        "v_t in mm/s, unit not stated",
         text(_scaled(1, 1e3)),
         "--unit v_t=mm/s",
         expected=values(v_t=VALUES[:, 1] * 1e3),
     ),
     flagged(
-        "F_n in mN that nothing states",
+        "F_n in mN, unit not stated",
         text(_scaled(2, 1e3)),
         "--unit F_n=mN",
         expected=values(F_n=VALUES[:, 2] * 1e3),
     ),
     refused(
-        "t in ms that nothing states",
+        "t in ms, unit not stated",
         text(_scaled(0, 1e3)),
         "2 s between two rows; these look like ms. State it: --unit t=ms",
     ),
-    refused("t in us that nothing states", text(_scaled(0, 1e6)), "--unit t=us"),
-    refused("t in ns that nothing states", text(_scaled(0, 1e9)), "--unit t=ns"),
+    refused("t in us, unit not stated", text(_scaled(0, 1e6)), "--unit t=us"),
+    refused("t in ns, unit not stated", text(_scaled(0, 1e9)), "--unit t=ns"),
     table("t in ns with --unit t=ns", text(_scaled(0, 1e9)), units={"t": "ns"}),
     flagged(
-        "rows that are conditions, one a second, with --unit t=s",
+        "one row per second (test conditions), with --unit t=s",
         text(with_column(0, lambda k, _: str(k))),
         "1 Hz: nothing is smoothed",
         units={"t": "s"},
@@ -217,34 +222,34 @@ NUMBERS: tuple[Border, ...] = (
         ),
     ),
     refused(
-        "ms since 1970 that nothing states",
+        "ms since 1970, unit not stated",
         text(_times(1_700_000_000, 1000)),
         "--unit t=ms",
     ),
     table(
-        "ns since 1970 by the header",
+        "ns since 1970, stated in the header",
         text(_times(1_048_576_000, 1_000_000_000), names=_names(t="ns")),
     ),
-    table("ISO 8601 with a zone", text(_iso("Z"))),
+    table("ISO 8601 with time zone", text(_iso("Z"))),
     table("ISO 8601 with +01:00", text(_iso("+01:00"))),
-    table("ISO 8601 without a zone, a blank before the time", text(_iso("", " "))),
+    table("ISO 8601 without time zone, space before the time", text(_iso("", " "))),
     refused(
-        "ISO 8601, one row without its zone",
+        "ISO 8601, one row without time zone",
         text(_iso("Z")).replace(".010Z", ".010"),
         "line 7, column t: '2026-11-26T10:00:00.010' stands where a time like",
     ),
     refused(
-        "a time of day without a date",
+        "time of day without a date",
         text(with_column(0, lambda k, _: f"10:00:00.{2 * k:03d}")),
         "a number",
     ),
     refused(
-        "a 30th of February",
+        "30 February",
         text(_iso("Z")).replace("2026-11-26T10:00:00.004", "2026-02-30T10:00:00.004"),
         "line 4, column t",
     ),
     refused(
-        "a time that goes back",
+        "decreasing time in one row",
         text(with_cell(20, 0, "0.0370")),
         "line 22, column t: time does not increase (0.038 s, then 0.037 s)",
     ),
@@ -254,104 +259,104 @@ NUMBERS: tuple[Border, ...] = (
         "split the file at line 32",
     ),
     refused(
-        "times of too few digits",
+        "times with too few decimals",
         text(with_column(0, lambda k, old: f"{float(old):.2f}")),
         "leave t out and give --rate HZ",
     ),
     refused(
-        "two rows of one time",
+        "two rows with the same time",
         text(with_column(0, lambda k, old: "0.016" if k == 9 else old)),
         "Sort the rows by time, each time once",
     ),
-    refused("rows in falling order of time", text(ROWS[::-1]), "--negate t"),
-    table("a row that stands there twice", text([*ROWS[:9], ROWS[8], *ROWS[9:]])),
+    refused("rows in descending order of time", text(ROWS[::-1]), "--negate t"),
+    table("duplicate row", text([*ROWS[:9], ROWS[8], *ROWS[9:]])),
     flagged(
-        "an hour's gap inside the trial",
+        "gap of an hour within the trial",
         text(_HOUR[0]),
         "gap of 3600 s before line 32",
         expected=_HOUR[1],
     ),
     flagged(
-        "a jump of ten years",
+        "time jump of ten years",
         text(_DECADE[0]),
         "gap of 3.15e+08 s before line 32",
         expected=_DECADE[1],
     ),
     refused(
-        "dates of one country",
+        "country-specific date format",
         text(with_column(0, lambda k, _: f"11/26/2026 10:00:00.{2 * k:03d}")),
         "leave the column out and give --rate HZ",
     ),
     refused(
-        "days of a spreadsheet",
+        "spreadsheet dates (days)",
         text(with_column(0, lambda k, _: f"{46352.5 + 0.002 * k / 86400:.10f}")),
         "these look like days. State it: --unit t=d",
     ),
     table(
-        "a foot that stands in a third of the rows, and slides evenly else",
+        "foot at rest in a third of the rows, otherwise at constant speed",
         text(with_column(1, lambda k, _: "1.5" if k % 3 else "0")),
         expected=values(v_t=np.array([1.5 if k % 3 else 0.0 for k in range(COUNT)])),
     ),
     flagged(
-        "9999 for a missing value, in 4 % of the rows",
+        "9999 as missing value, in 4 % of the rows",
         text(with_column(2, lambda k, old: "9999" if k in {20, 21} else old)),
         "F_n is 9999 in 2 rows, the first is line 22",
         expected=_SENTINELS,
     ),
     flagged(
-        "one row of 1e6 N",
+        "spike of 1e6 N in one row",
         text(with_cell(30, 3, "1000000")),
         "F_t is 1e+06 in line 32",
         expected=_SPIKED,
     ),
     flagged(
-        "250 rows a second",
+        "250 rows per second",
         text(_HALF),
         "250 Hz, not 500: averaged over 22 ms",
         expected=values(t=np.array([float(r[0]) for r in _HALF])),
     ),
     flagged(
-        "20 rows a second",
+        "20 rows per second",
         text(_SLOW),
         "20 Hz: nothing is smoothed, and slips are not seen",
         expected=values(t=np.array([float(r[0]) for r in _SLOW])),
     ),
     table(
-        "a foot that slides, as it should",
+        "plausible sliding foot",
         _pushed()[0],
         expected=_pushed()[1],
         doubts=True,
     ),
     flagged(
-        "compression below zero",
+        "negative compression force",
         _pushed(F_n=-1)[0],
         "--negate F_n",
         expected=_pushed(F_n=-1)[1],
         doubts=True,
     ),
     table(
-        "compression below zero, with --negate F_n",
+        "negative compression force, with --negate F_n",
         _pushed(F_n=-1)[0],
         expected=_pushed()[1],
         doubts=True,
         negate=["F_n"],
     ),
     flagged(
-        "F_t of the other sign",
+        "F_t with the wrong sign",
         _pushed(F_t=-1)[0],
         "--negate F_t",
         expected=_pushed(F_t=-1)[1],
         doubts=True,
     ),
     flagged(
-        "v_t and F_t of the other sign",
+        "v_t and F_t with the wrong sign",
         _pushed(v=-1, F_t=-1)[0],
         "--negate v_t",
         expected=_pushed(v=-1, F_t=-1)[1],
         doubts=True,
     ),
     flagged(
-        "F_t of zero",
+        "F_t zero throughout",
         _pushed(F_t=0)[0],
         "F_t is 0 throughout",
         expected=_pushed(F_t=0)[1],

@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 
 class Outcome(Enum):
-    """The possible outcomes of a foreign input."""
+    """Possible outcomes of an external input."""
 
     READ = "read exactly"
-    FLAGGED = "read exactly, flagged"
-    REFUSED = "refused with cause"
-    WRONG = "read wrongly"  # expected by no row
+    FLAGGED = "read exactly, with a warning"
+    REFUSED = "refused with a reason"
+    WRONG = "read incorrectly"  # expected by no row
 
 
 class Answer(NamedTuple):
@@ -30,13 +30,13 @@ class Answer(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Border:
-    """A foreign input of the program.
+    """An external input of the program.
 
     Attributes:
-        given: the input, in words.
+        given: description of the input.
         outcome: expected outcome.
-        says: expected words of the answer.
-        act: gives the input to the program, in an empty folder.
+        says: expected part of the answer.
+        act: passes the input to the program, in an empty folder.
     """
 
     given: str

@@ -1,4 +1,4 @@
-"""The mark of simulated trials in tables, and tables of both kinds together."""
+"""The column `simulated` of tables, and mixed simulated and recorded tables."""
 
 import io
 from contextlib import redirect_stderr, redirect_stdout
@@ -31,7 +31,7 @@ def _csv(mark: str) -> Border:
         return _kind(folder / "T02.csv")
 
     says = "simulated" if mark == "1" else "recorded"
-    return Border(f"a CSV whose column simulated is {mark}", Outcome.READ, says, act)
+    return Border(f"CSV with column simulated = {mark}", Outcome.READ, says, act)
 
 
 def _parquet(folder: Path) -> Answer:
@@ -70,22 +70,20 @@ def _fitted(folder: Path) -> Answer:
 SIMULATED: tuple[Border, ...] = (
     _csv("1"),
     _csv("0"),
-    Border(
-        "Parquet whose column simulated is true", Outcome.READ, "simulated", _parquet
-    ),
+    Border("Parquet with column simulated = true", Outcome.READ, "simulated", _parquet),
     refused(
-        "a CSV whose column simulated changes",
+        "CSV with a changing column simulated",
         _marked("1") + _marked("0").partition("\n")[2],
         f"line {COUNT + 2}, column simulated: '0'",
     ),
     Border(
-        "traction fit of a simulated and a recorded table",
+        "traction fit of simulated and recorded tables",
         Outcome.REFUSED,
         "cannot mix simulated and recorded trials",
         _fitted,
     ),
     Border(
-        "traction.fit of a simulated and a recorded table",
+        "traction.fit of simulated and recorded tables",
         Outcome.REFUSED,
         "cannot be mixed",
         _loaded,

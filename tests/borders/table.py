@@ -12,15 +12,15 @@ from tests.borders.numbers import NUMBERS
 from tests.borders.row import Border
 from tests.borders.simulated import SIMULATED
 
-# A subject of its own is a module with its rows, named here.
+# Each subject is a module with its rows.
 SUBJECTS: dict[str, tuple[Border, ...]] = {
     "Text tables: layout": LAYOUTS,
     "Text tables: numbers, units and times": NUMBERS,
     "Other formats": FORMATS,
     "Simulated and recorded": SIMULATED,
-    "Calls and names of files": CALLS,
+    "Python calls and file names": CALLS,
 }
-_MAX_KB = 500_000  # that a row may add to the peak memory
+_MAX_KB = 500_000  # limit of the growth of peak memory by one row
 
 
 def border_attacks() -> list[Attack]:

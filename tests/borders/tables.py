@@ -1,4 +1,4 @@
-"""Tables of the rows of borders, and how the program is given them."""
+"""Tables for the rows of borders, and how they are passed to the program."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -16,7 +16,7 @@ from tests.borders.row import Answer, Border, Outcome
 NAMES = ("t", "v_t", "F_n", "F_t")
 COUNT = 60
 Cells = Sequence[Sequence[str]]
-# As other programs write them: different decimals, 500 rows a second.
+# As written by other programs: different numbers of decimals, 500 rows per second.
 ROWS = [
     [
         f"{0.002 * k:.4f}",
@@ -74,7 +74,7 @@ def judged(
     read = np.column_stack([series.t, series.v_t, series.F_n, series.F_t])
     wanted = VALUES if expected is None else expected
     if read.shape != wanted.shape or not np.allclose(read, wanted, 1e-12, 1e-12):
-        return Answer(Outcome.WRONG, f"{read[:2]} in the place of {wanted[:2]}")
+        return Answer(Outcome.WRONG, f"{read[:2]} instead of {wanted[:2]}")
     words = [*series.notes, *(_doubts(series) if doubts else ())]
     return Answer(Outcome.FLAGGED if words else Outcome.READ, "; ".join(words))
 
@@ -110,5 +110,5 @@ def refused(given: str, content: str | bytes, says: str, **options: Any) -> Bord
 
 
 def flagged(given: str, content: str | bytes, says: str, **options: Any) -> Border:
-    """A row of a file that is read, and flagged."""
+    """A row of a file that is read with a warning."""
     return table(given, content, Outcome.FLAGGED, says, **options)

@@ -1,4 +1,4 @@
-"""No foreign input is read wrongly, or changed without a message."""
+"""No external input is read incorrectly or changed without a message."""
 
 import pytest
 
