@@ -1,4 +1,4 @@
-"""Every fault in every phase through the whole program, on stepped time."""
+"""Every fault in every phase through the whole program, in stepped time."""
 
 import pytest
 

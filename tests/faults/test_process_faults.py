@@ -1,4 +1,4 @@
-"""Processes, signals and the disk in every phase, on the wall clock."""
+"""Faults of processes, signals and the disk in every phase, on the wall clock."""
 
 import pytest
 
