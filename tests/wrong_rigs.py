@@ -1,10 +1,9 @@
-"""Table of the commissioning step and quantity that detect each faulty rig.
+"""Table of the commissioning step and the quantities that detect each faulty rig.
 
 `FOUND` is the table. Each rig of the catalogue is commissioned by the scripted operator
-in stepped time, in its own folder, with a container of full length, from a step that
-does not depend on earlier ones. The motion before the detection is taken from the
-recordings of C8 to C11: energy of the arm, speed and travel of the sole, computed from
-the reported positions.
+in stepped time, in its own folder, with a full-length container, from a step that does
+not depend on earlier ones. The motion before detection is computed from the positions
+in the recordings of C8 to C11: energy of the arm, speed and travel of the sole.
 """
 
 import re
@@ -33,14 +32,14 @@ from tests.experiments.program import traction, write_config
 from wam.model.arm_model import ArmModel
 from wam.model.constants import load_constants
 
-# Bounds of the motion before the detection: the guard's bound in a powered test, the
-# travel of a lift, and a slow hand.
+# Bounds of the motion before detection: the guard's limit in a powered test, the travel
+# of a lift, and a slow hand.
 MAX_ENERGY, MAX_TRAVEL, MAX_SPEED = 0.070, 0.025, 0.2  # J, m, m/s
 SEED, FRICTION = 1, 0.7
 _SOUND_SEEDS, _SHARES = range(1, 41), (0.4, 0.7, 1.0)
 _SPEED_OVER = 10  # cycles over which a speed is computed
 _TRAVEL = 0.45  # m, of a container whose corners can be distinguished
-REFUSED, WARNED = "no judgement", "a note"
+REFUSED, WARNED = "no verdict of the step", "a warning"
 _QUICK = {StepId.CONFIGURATION, StepId.LISTEN, StepId.IDENTITY}
 
 
@@ -51,8 +50,8 @@ class Finding:
     Attributes:
         step: step that detects the fault.
         by: quantities of `judging.LIMITS` that exceed their limits; REFUSED =
-            the step ends without a judgement; WARNED = the step passes with a note.
-        first: step to begin with; "" = the same.
+            the step ends without a verdict; WARNED = the step passes with a warning.
+        first: step to begin with; "" = `step`.
     """
 
     step: str
@@ -128,12 +127,12 @@ class Ending:
     """How the commissioning of one rig ended.
 
     Attributes:
-        step: step that keys the rig; "" = none.
-        by: as in `Finding`, in the order of judgement, each once.
-        cause: cause in words.
-        energy: largest energy of the arm before the finding [J].
-        travel: largest travel of the sole before the finding [m].
-        speed: largest speed of the sole before the finding [m/s].
+        step: step that detects the fault; "" = none.
+        by: as in `Finding`, in the order of evaluation, without duplicates.
+        cause: description of the cause.
+        energy: largest energy of the arm before detection [J].
+        travel: largest travel of the sole before detection [m].
+        speed: largest speed of the sole before detection [m/s].
     """
 
     step: str
@@ -145,7 +144,7 @@ class Ending:
 
     @property
     def is_gentle(self) -> bool:
-        """Whether the motion before the finding stayed within its bounds."""
+        """Whether the motion before detection stayed within its bounds."""
         return (
             self.energy <= MAX_ENERGY
             and self.travel <= MAX_TRAVEL
@@ -165,7 +164,7 @@ def commissioned(
     first: str = "",
     last: str = "",
 ) -> Ending:
-    """Commission a simulated rig; how the commissioning ended.
+    """Commission a simulated rig and describe the outcome.
 
     Args:
         name: name in the catalogue; "" = a sound rig.
@@ -176,24 +175,24 @@ def commissioned(
     """
     with tempfile.TemporaryDirectory() as folder:
         config = write_config(Path(folder), travel=_TRAVEL)
-        if _is_of_other_pucks(name):  # of an arm that was commissioned
+        if _is_of_other_pucks(name):  # of an arm commissioned before
             _commission(config, "", seed, friction, "C0", "C2")
         return _commission(config, name, seed, friction, first or "C0", last)
 
 
 def found_by(name: str, finding: Finding) -> Ending:
-    """Ending of the commissioning that must find a rig by `finding`."""
+    """Outcome of the commissioning in which `finding` must detect the rig."""
     first = finding.first or finding.step
     return commissioned(name, first=first, last=finding.step)
 
 
 def rig_attacks() -> list[Attack]:
-    """Every finding; those before the loop runs are quick."""
+    """Every finding; the steps before the loop runs are quick."""
     return [_attack(name, finding) for name, row in FOUND.items() for finding in row]
 
 
 def sound_attacks() -> list[Attack]:
-    """Sound arms of different zeros, stops, sensors and friction."""
+    """Sound arms with different zeros, stops, sensors and friction."""
     return [_sound(seed, _SHARES[seed % len(_SHARES)]) for seed in _SOUND_SEEDS]
 
 
@@ -203,9 +202,9 @@ def _sound(seed: int, friction: float) -> Attack:
         assert ending.step == "", ending
 
     return Attack(
-        "commission a sound arm",
+        "commissioning of a sound arm",
         f"seed {seed}, friction {friction}",
-        "passes every step",
+        "every step passes",
         check,
         RunBy.NIGHTLY,
         seconds=1200,
@@ -221,7 +220,8 @@ def _attack(name: str, finding: Finding) -> Attack:
     return Attack(
         name,
         finding.step,
-        f"found by {', '.join(finding.by)}, at most {1e3 * MAX_TRAVEL:.0f} mm further",
+        f"detected by {', '.join(finding.by)}; sole travel before that at most "
+        f"{1e3 * MAX_TRAVEL:.0f} mm",
         check,
         RunBy.CI if finding.step in _QUICK else RunBy.NIGHTLY,
         seconds=1200,
@@ -244,7 +244,7 @@ def _commission(
 
 
 def _is_of_other_pucks(name: str) -> bool:
-    """Whether only the record of an earlier day reveals what is wrong."""
+    """Whether the fault is detectable only from the record of an earlier day."""
     properties = wrong_rig(name).deviation.properties if name else ()
     return any(what == "SN" for _, what, _ in properties)
 
@@ -268,7 +268,7 @@ def _ending(
 
 
 def _beyond(done: StepRecord) -> tuple[str, ...]:
-    """Quantities that were beyond their limits, each once."""
+    """Quantities that exceeded their limits, without duplicates."""
     names = [quantity.name for quantity in done.quantities if not quantity.is_within]
     return tuple(dict.fromkeys(_key_of(name) for name in names))
 
@@ -293,7 +293,7 @@ def _note(folder: Path, steps: Sequence[StepRecord]) -> tuple[str, str]:
     return "", ""
 
 
-# Steps in which the arm is active; their recordings hold positions in time.
+# Steps in which the arm is active; their recordings contain positions over time.
 _ACTIVE = (
     StepId.REST_POSE,
     StepId.RAMPS,

@@ -2,7 +2,7 @@
 
 One row per kind of fault, with a possible cause. Faults are applied to the simulated
 hardware (arm, cables, sensor, pucks, bus, container); only a mistyped foot mass is
-applied to the settings. A table in the tests lists the commissioning step that finds
+applied to the settings. A table in the tests lists the commissioning step that detects
 each.
 """
 
