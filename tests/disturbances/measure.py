@@ -1,4 +1,4 @@
-"""Outcomes of disturbed trials, on the path that a user's data take."""
+"""Outcomes of disturbed trials, on the path that user data take."""
 
 import tarfile
 from collections.abc import Iterator
@@ -45,7 +45,7 @@ class Observation:
     Attributes:
         outcome: refused or flagged; harmless if there was no message.
         words: text of the message.
-        changed: share by which F_t/F_n changed; 0 without a ratio.
+        changed: relative change of F_t/F_n; 0 without a ratio.
     """
 
     outcome: Outcome
@@ -54,7 +54,7 @@ class Observation:
 
 
 def disturbance_attacks() -> list[Attack]:
-    """Every row, of tables and of recordings."""
+    """All rows of tables and of recordings."""
     return [*map(_table_attack, TABLES), *map(_recording_attack, RECORDINGS)]
 
 
@@ -62,7 +62,7 @@ def _table_attack(row: TableRow) -> Attack:
     def check(_: Path) -> None:
         _compare(row, see_table(row))
 
-    return Attack(row.name, "a table, fitted", _holds(row), check)
+    return Attack(row.name, "fit of a table", _holds(row), check)
 
 
 def _recording_attack(row: RecordingRow) -> Attack:
@@ -70,7 +70,7 @@ def _recording_attack(row: RecordingRow) -> Attack:
         with recorded_trial() as source:
             _compare(row, see_recording(row, source))
 
-    return Attack(row.name, "a recorded trial, at the review", _holds(row), check)
+    return Attack(row.name, "review of a recorded trial", _holds(row), check)
 
 
 def _holds(row: TableRow | RecordingRow) -> str:
@@ -88,7 +88,7 @@ def _compare(row: TableRow | RecordingRow, seen: Observation) -> None:
 
 
 def see_table(row: TableRow) -> Observation:
-    """Outcome of a table, as `traction fit` reads and doubts the table."""
+    """Outcome of a table that `traction fit` reads and checks."""
     with np.load(DATA / "rehearsal_slice.npz") as arrays:
         table = arrays[TRIALS[row.terrain]].astype(float)
     with TemporaryDirectory() as folder:
@@ -164,5 +164,5 @@ def see_recording(row: RecordingRow, source: Path) -> Observation:
 
 
 def _check(text: str) -> str:
-    """The check of the review that gives `text`: its first word."""
+    """The check of the review that printed `text`: its first word."""
     return text.split(maxsplit=1)[0]

@@ -1,4 +1,4 @@
-"""Rewrites a recorded trial with other cycles or attachments."""
+"""Rewrite a recorded trial with other cycles or attachments."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -23,7 +23,7 @@ class Outcome(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """A recorded trial as a disturbance changes it."""
+    """The parts of a recorded trial that a disturbance changes."""
 
     cycles: Record
     payload: Payload
@@ -36,12 +36,12 @@ class TableRow:
     """A disturbance of a table of t, v_t, F_n and F_t.
 
     Attributes:
-        name: what is wrong.
+        name: description of the disturbance.
         disturb: changes a table, shape (n, 4).
         outcome: expected outcome.
-        word: word of the refusal or the warning; for a harmless disturbance the largest
-            share by which F_t/F_n may change.
-        terrain: terrain whose trial is disturbed.
+        word: part of the refusal or the warning; for a harmless disturbance the largest
+            permitted relative change of F_t/F_n.
+        terrain: terrain of the disturbed trial.
         header: header of the table, if it is a CSV.
     """
 
@@ -55,7 +55,7 @@ class TableRow:
 
 @dataclass(frozen=True, slots=True)
 class RecordingRow:
-    """A disturbance of a recorded trial; the rest as `TableRow`."""
+    """A disturbance of a recorded trial; attributes as in `TableRow`."""
 
     name: str
     disturb: Callable[[Recording], Recording]
@@ -84,7 +84,7 @@ def swapped(table: Array) -> Array:
 
 
 def jumped(table: Array) -> Array:
-    """Make the clock jump by a second in the middle."""
+    """Make the clock jump forward by a second in the middle."""
     table[len(table) // 2 :, T] += 1.0
     return table
 
@@ -109,12 +109,12 @@ def with_gaps(table: Array) -> Array:
 
 REFUSED, FLAGGED, HARMLESS = Outcome
 TABLES = (
-    TableRow("nothing", lambda table: table, HARMLESS, 0.0),
-    TableRow("F_t with the other sign", times(F, -1.0), FLAGGED, "drives the foot"),
+    TableRow("no disturbance", lambda table: table, HARMLESS, 0.0),
+    TableRow("F_t with the wrong sign", times(F, -1.0), FLAGGED, "drives the foot"),
     TableRow(
-        "F_n with the other sign", times(N, -1.0), FLAGGED, "pulls at the moving foot"
+        "F_n with the wrong sign", times(N, -1.0), FLAGGED, "pulls at the moving foot"
     ),
-    TableRow("heading by 180 degrees", times(V, -1.0), FLAGGED, "moves backward"),
+    TableRow("heading off by 180 degrees", times(V, -1.0), FLAGGED, "moves backward"),
     TableRow("v_t in mm/s", times(V, 1e3), REFUSED, "--unit v_t=mm/s"),
     TableRow("time in ms", times(T, 1e3), FLAGGED, "--unit t=ms"),
     TableRow("F_n in mN", times(N, 1e3), FLAGGED, "--unit F_n=mN"),
@@ -122,18 +122,22 @@ TABLES = (
     TableRow("F_t in mN, F_n in N", times(F, 1e3), FLAGGED, "outside 0.15 to 5"),
     TableRow("F_n and F_t swapped", swapped, FLAGGED, "swapped"),
     TableRow("F_n and F_t swapped, plate", swapped, FLAGGED, "swapped", "TF"),
-    TableRow("force 20 ms late", late(10), FLAGGED, "--what-if lag=2"),
-    TableRow("force 8 ms late", late(4), FLAGGED, "lag"),
-    TableRow("force 500 ms late", late(250), FLAGGED, "lag=50"),
-    TableRow("clock jumps by 1 s", jumped, FLAGGED, "gap of 1"),
-    TableRow("clock goes back by 1 s", backward, REFUSED, "time does not increase"),
-    TableRow("every tenth row is no number", with_gaps, FLAGGED, "without a value"),
-    TableRow("each row twice", lambda x: np.repeat(x, 2, 0), FLAGGED, "duplicate rows"),
-    TableRow("zeros", lambda x: x * [1.0, 0, 0, 0], REFUSED, "No sample"),
-    TableRow("five rows", lambda x: x[:5], REFUSED, "No sample"),
+    TableRow("force delayed by 20 ms", late(10), FLAGGED, "--what-if lag=2"),
+    TableRow("force delayed by 8 ms", late(4), FLAGGED, "lag"),
+    TableRow("force delayed by 500 ms", late(250), FLAGGED, "lag=50"),
+    TableRow("clock jumps forward by 1 s", jumped, FLAGGED, "gap of 1"),
+    TableRow("clock jumps back by 1 s", backward, REFUSED, "time does not increase"),
+    TableRow("NaN in every tenth row", with_gaps, FLAGGED, "without a value"),
+    TableRow(
+        "every row duplicated", lambda x: np.repeat(x, 2, 0), FLAGGED, "duplicate rows"
+    ),
+    TableRow(
+        "v_t, F_n and F_t zero", lambda x: x * [1.0, 0, 0, 0], REFUSED, "No sample"
+    ),
+    TableRow("only five rows", lambda x: x[:5], REFUSED, "No sample"),
     TableRow("100 Hz", lambda x: x[::5], FLAGGED, "100 Hz, not 500"),
     TableRow(
-        "a smooth plate at 100 Hz", lambda x: x[::5], FLAGGED, "100 Hz, not 500", "TF"
+        "100 Hz, smooth plate", lambda x: x[::5], FLAGGED, "100 Hz, not 500", "TF"
     ),
     TableRow(
         "units stated in the header",
@@ -141,16 +145,18 @@ TABLES = (
         *(HARMLESS, 1e-6, "S0", "t [s],v_t [mm/s],F_n [N],F_t [N]"),
     ),
     TableRow(
-        "a unit that there is not",
+        "unknown unit",
         times(V, 1.0),
         *(REFUSED, "not a unit", "S0", "t,v_t [kn],F_n,F_t"),
     ),
-    TableRow("a column twice", times(V, 1.0), REFUSED, "twice", "S0", "t,F_n,F_n,F_t"),
+    TableRow(
+        "duplicate column", times(V, 1.0), REFUSED, "twice", "S0", "t,F_n,F_n,F_t"
+    ),
 )
 
 
 def turned(degrees: float) -> Callable[[Recording], Recording]:
-    """A disturbance that turns the sensor about its z axis, also during the tare."""
+    """A disturbance that rotates the sensor about its z axis, also during the tare."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     once = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     both = np.kron(np.eye(2), once)
@@ -179,7 +185,7 @@ def heavier(share: float) -> Callable[[Recording], Recording]:
 
 
 def moved(**changes: float) -> Callable[[Recording], Recording]:
-    """A disturbance that enters the container wrong: incline or heading [degrees]."""
+    """A disturbance of the stated container: error of incline or heading [degrees]."""
 
     def disturb(recording: Recording) -> Recording:
         frame = recording.frame
@@ -193,13 +199,13 @@ def moved(**changes: float) -> Callable[[Recording], Recording]:
 
 
 def longer(height: float) -> Callable[[Recording], Recording]:
-    """A disturbance that mounts a foot longer than entered by `height` [m]."""
+    """A disturbance that mounts a foot longer than entered, by `height` [m]."""
     lower = np.array([0.0, 0.0, height])
     return lambda recording: replace(recording, sole=recording.sole - lower)
 
 
 def tared_on_the_ground(recording: Recording) -> Recording:
-    """Tare the foot while it stands on the ground with 8 N."""
+    """Tare the foot while it presses on the ground with 8 N."""
     bias = recording.payload.bias.copy()
     bias[2] -= 8.0 * recording.payload.sign
     return replace(recording, payload=replace(recording.payload, bias=bias))
@@ -251,15 +257,13 @@ def zero_wrong(cycles: Record) -> None:
 
 
 RECORDINGS = (
-    RecordingRow("nothing", lambda r: r, HARMLESS, 0.0),
-    RecordingRow("sensor turned by 180 degrees", turned(180.0), FLAGGED, "turned"),
-    RecordingRow("sensor turned by 90 degrees", turned(90.0), FLAGGED, "turned by 90"),
-    RecordingRow("sensor turned by 5 degrees", turned(5.0), HARMLESS, 0.03),
+    RecordingRow("no disturbance", lambda r: r, HARMLESS, 0.0),
+    RecordingRow("sensor rotated by 180 degrees", turned(180.0), FLAGGED, "turned"),
+    RecordingRow("sensor rotated by 90 degrees", turned(90.0), FLAGGED, "turned by 90"),
+    RecordingRow("sensor rotated by 5 degrees", turned(5.0), HARMLESS, 0.03),
+    RecordingRow("moment axes swapped", of_cycles(swap_moments), FLAGGED, "moment"),
     RecordingRow(
-        "axes of the moment swapped", of_cycles(swap_moments), FLAGGED, "moment"
-    ),
-    RecordingRow(
-        "moments with the other sign",
+        "moments with the wrong sign",
         of_cycles(flip_moments),
         FLAGGED,
         "the force acts",
@@ -268,22 +272,20 @@ RECORDINGS = (
     RecordingRow("foot 20 % heavier than entered", heavier(0.2), HARMLESS, 0.03),
     RecordingRow("foot 30 mm longer than entered", longer(0.03), HARMLESS, 0.01),
     RecordingRow(
-        "tared with the foot on the ground", tared_on_the_ground, FLAGGED, "tare"
+        "tare with the foot on the ground", tared_on_the_ground, FLAGGED, "tare"
     ),
-    RecordingRow(
-        "incline wrong by 10 degrees", moved(incline=10.0), FLAGGED, "incline"
-    ),
-    RecordingRow("incline wrong by 2 degrees", moved(incline=2.0), HARMLESS, 0.15),
-    RecordingRow(
-        "heading wrong by 10 degrees", moved(heading=10.0), FLAGGED, "heading"
-    ),
-    RecordingRow("heading wrong by 4 degrees", moved(heading=4.0), HARMLESS, 0.02),
-    RecordingRow("an axis saturated", of_cycles(saturate), FLAGGED, "saturated"),
+    RecordingRow("incline off by 10 degrees", moved(incline=10.0), FLAGGED, "incline"),
+    RecordingRow("incline off by 2 degrees", moved(incline=2.0), HARMLESS, 0.15),
+    RecordingRow("heading off by 10 degrees", moved(heading=10.0), FLAGGED, "heading"),
+    RecordingRow("heading off by 4 degrees", moved(heading=4.0), HARMLESS, 0.02),
+    RecordingRow("axis saturated", of_cycles(saturate), FLAGGED, "saturated"),
     RecordingRow("F_z frozen", of_cycles(freeze), FLAGGED, "Fz stands"),
     RecordingRow("force samples stale", of_cycles(go_stale), FLAGGED, "stale"),
-    RecordingRow("clock jumps by 1 s", of_cycles(jump), FLAGGED, "worst gap"),
-    RecordingRow("foot loose by 0.1 rad", of_cycles(turn_foot), FLAGGED, "joint 7"),
+    RecordingRow("clock jumps forward by 1 s", of_cycles(jump), FLAGGED, "worst gap"),
     RecordingRow(
-        "joint 4 zeroed 10 degrees off", of_cycles(zero_wrong), HARMLESS, 0.08
+        "foot rotated by 0.1 rad (loose)", of_cycles(turn_foot), FLAGGED, "joint 7"
+    ),
+    RecordingRow(
+        "zero of joint 4 off by 10 degrees", of_cycles(zero_wrong), HARMLESS, 0.08
     ),
 )

@@ -1,4 +1,4 @@
-"""No disturbance of a trial passes in silence, unless a number says it is harmless."""
+"""Every disturbance of a trial is reported or has a bounded effect on F_t/F_n."""
 
 import pytest
 
