@@ -76,7 +76,8 @@ def after_power_cut(operations: Sequence[Operation], rng: np.random.Generator) -
     """Return one possible disk after a power cut right after `operations`.
 
     Synced operations are on the disk. Of the others, each file and each folder keeps
-    none, all, the first, the first with the last one torn, a random part, or zeros.
+    none, all, the first few, the first few with the last one torn, a random subset, or
+    zeros.
     """
     synced = _synced(operations)
     survived = []

@@ -39,8 +39,8 @@ def _power_cuts(seed: int, run_by: RunBy) -> Attack:
 
     return Attack(
         "power cut",
-        f"{_CUTS_PER_ROW} random moments of a session, seed {seed}",
-        "no kept trial is lost; the session can be repaired",
+        f"random moments of a session: {_CUTS_PER_ROW}, seed {seed}",
+        "no kept trial lost; session recoverable",
         check,
         run_by,
         seconds=400,
@@ -54,8 +54,8 @@ def _failing(kind: str, seed: int, count: int, run_by: RunBy) -> Attack:
 
     return Attack(
         f"disk {kind}",
-        f"{count} random moments of a session, seed {seed}",
-        "the error is reported with an exit code; no kept trial is lost",
+        f"sessions with a failure at a random moment: {count}, seed {seed}",
+        "error reported with an exit code; no kept trial lost",
         check,
         run_by,
         seconds=120.0 * count,

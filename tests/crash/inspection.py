@@ -18,7 +18,7 @@ from tests.experiments.program import Done, digest, traction
 
 CLOCK = SystemClock()
 LEFTOVERS = ("*.tmp", "*.mcap.partial", ".recover-*")
-FLUSHES = 3  # by then a trial file holds more than its header
+FLUSHES = 3  # after these a trial file contains more than its header
 Journals = dict[Path, list[dict]]  # events by folder, relative to the data
 
 
@@ -59,7 +59,7 @@ def events_in(journal: bytes) -> list[dict]:
 
 
 def kept_checksums(events: Sequence[dict]) -> dict[tuple[int, int], str]:
-    """Return {(trial, attempt): sha256} of all attempts that were ever kept."""
+    """Return {(trial, attempt): sha256} of all attempts kept at any time."""
     return {
         (event["trial"], event["attempt"]): event["sha256"]
         for event in events

@@ -31,7 +31,7 @@ CALLS = 500  # system calls of a session, approximately
 
 @dataclass
 class FailingDisk:
-    """Makes calls of one kind fail from a given one on; a `limit` of `recorded`.
+    """Make calls of one kind fail from a given one on; used as `limit` of `recorded`.
 
     Attributes:
         kind: one of `KINDS`.
@@ -129,7 +129,7 @@ def run_commands(config: Path, data: Path) -> list[Done]:
 
 
 def run_session(config: Path, data: Path) -> Done:
-    """Run two short trials; the creation of the session may fail, too."""
+    """Run two short trials; creating the session may fail as well."""
     original = AutoOperator.answer
 
     def answer(self, asked):
