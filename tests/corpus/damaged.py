@@ -1,4 +1,4 @@
-"""Damaged inputs of every kind are read in a process with limited memory."""
+"""Damaged inputs of every kind, read in a process with limited memory."""
 
 import json
 import subprocess
@@ -29,7 +29,7 @@ def _attack(kind: str, seeds: range, run_by: RunBy) -> Attack:
     return Attack(
         f"{kind} damaged",
         f"seeds {seeds[0]} to {seeds[-1]}",
-        "read, or refused with a reason, within 300 MB and 10 s",
+        "read, or refused with a reason, within 300 MB and 10 s per input",
         check,
         run_by,
         seconds=600,
@@ -39,7 +39,7 @@ def _attack(kind: str, seeds: range, run_by: RunBy) -> Attack:
 def read_damaged(kind: str, seeds: range) -> list[str]:
     """Read the mutations `seeds` of a kind; return the problems.
 
-    A mutation that ends the reading process is reported; a new process reads the rest.
+    A mutation that crashes the reader is reported; a new process reads the others.
     """
     problems: list[str] = []
     while seeds:

@@ -1,6 +1,6 @@
 """Readers of every kind of input, as functions of bytes and a folder.
 
-A reader puts the bytes where they belong in the empty folder and reads them as the
+A reader writes the bytes to their usual place in the empty folder and reads them as the
 program does. It returns or raises a `TractionError`; anything else is a failure.
 """
 
@@ -202,7 +202,7 @@ def _frames(data: bytes, _: Path) -> None:
 
 
 def _sensor(data: bytes, _: Path) -> None:
-    """Read `data` in pieces as a stream of each sensor kind, with timestamps."""
+    """Read `data` in chunks as a stream of each sensor kind, with timestamps."""
     scanners = (
         bota.scanner(_RANGES),
         robotous.scanner(lambda: 1000.0),
