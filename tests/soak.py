@@ -1,11 +1,11 @@
-"""Simulated hours of sessions with random faults, checked for what must hold.
+"""Simulated hours of sessions with random faults, with checks of the invariants.
 
 python -m tests.soak --hours 1 --seed 1
 
-Every session is run, and resumed until it is complete, as a person would.
-Before each trial the journal, session.json and the verified files must agree; after
-each command the exit code and every message must be known, the arm at rest, and
-nothing left behind: descriptors, children, shared memory, memory.
+Every session is run and resumed until it is complete, as a person would do it. Before
+each trial the journal, session.json and the verified files must agree. After each
+command the exit code and every message must be known, the arm braked, and nothing
+leaked: file descriptors, child processes, shared memory, memory.
 """
 
 import argparse
@@ -45,7 +45,7 @@ TRIALS = 3
 CODES = {0, 3, 4, 5, 6}
 FAULT_SHARE = 0.7  # of the sessions
 MAX_RESUMES = 4
-GROWTH_KB = 60_000  # of a process after its first sessions
+GROWTH_KB = 60_000  # growth of a process after its first sessions
 WARM_SESSIONS = 10
 TERRAINS = ("TF", "Tf", "S0", "B10")
 # Faults that a rehearsal can raise in a trial without ending this process.
@@ -83,7 +83,7 @@ FAULTS = (
 
 
 def descriptors() -> int:
-    """Number of files that this process has open."""
+    """Number of open file descriptors of this process."""
     return len(list(Path("/proc/self/fd").iterdir()))
 
 
@@ -105,14 +105,14 @@ class Soak:
 
     Attributes:
         folder: folder of the sessions.
-        rng: draws terrains, faults and moments.
-        built: parts built for the present session.
-        simulated_ns: time that has passed in all simulations.
+        rng: generator of terrains, faults and times.
+        built: parts built for the current session.
+        simulated_ns: simulated time of all sessions.
         counts: sessions, trials, resumes, faults by name.
         base: descriptors and memory after the first sessions.
-        data: the folder of the present session.
-        children: processes of this one before the first session; a worker of pytest
-            keeps those that earlier tests started.
+        data: data folder of the current session.
+        children: child processes before the first session; a pytest worker keeps those
+            that earlier tests started.
     """
 
     folder: Path
@@ -148,7 +148,7 @@ class Soak:
         assert not left, left
 
     def check_growth(self) -> None:
-        """Compare descriptors, shared memory and memory with the beginning."""
+        """Compare descriptors, shared memory and memory with those at the start."""
         gc.collect()
         left = [path.name for path in Path("/dev/shm").glob("*traction*")]
         assert left == [], left
@@ -171,7 +171,7 @@ _KNOWN = [re.compile(_pattern(message.what)) for message in CATALOGUE.values()]
 
 
 def is_known(line: str) -> bool:
-    """Whether a message is one of the catalogue, or a driver's with its hint."""
+    """Whether a message is in the catalogue and reports no bug."""
     return any(known.match(line) for known in _KNOWN) and "Bug" not in line
 
 
@@ -211,7 +211,7 @@ def run_session(soak: Soak, config: Path) -> None:
 
 
 def remove(folder: Path) -> None:
-    """Delete the files of a session that was checked."""
+    """Delete the files of a checked session."""
     for path in sorted(folder.rglob("*"), reverse=True):
         if path.is_dir():
             path.rmdir()
@@ -237,7 +237,7 @@ def watch(patch: pytest.MonkeyPatch, soak: Soak) -> None:
 
 
 def press(asked) -> str:
-    """Key of short trials; keeps all that are not interrupted."""
+    """Key press for short trials; keeps all that are not interrupted."""
     waits = {Prompt.READY: (0.1, " "), Prompt.RECORDING: (1.0, " ")}
     wait, key = waits.get(asked.prompt, (0.05, "k"))
     if asked.prompt in {Prompt.SUPPORT, Prompt.PAUSED, Prompt.DAMPED}:
@@ -252,7 +252,7 @@ def press(asked) -> str:
 def soaked(
     hours: float, seed: int, folder: Path, report: Callable[[Soak], None]
 ) -> Soak:
-    """Run sessions until `hours` of simulated time have passed; `report` after each."""
+    """Run sessions for `hours` of simulated time; `report` after each."""
     soak = Soak(folder, np.random.default_rng(seed))
     config = write_config(folder)
     with pytest.MonkeyPatch.context() as patch:
@@ -274,13 +274,13 @@ def summary(soak: Soak) -> list[str]:
 
 
 def report(soak: Soak) -> None:
-    """Print the progress now and then."""
+    """Print the progress every 20 sessions."""
     if soak.counts["sessions"] % 20 == 0:
         print(" · ".join(summary(soak)[:1] + summary(soak)[-5:]))  # noqa: T201
 
 
 def main() -> None:
-    """Run sessions for the time of the command line."""
+    """Run sessions for the time given on the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--hours", type=float, default=1.0)
     parser.add_argument("--seed", type=int, default=1)
