@@ -24,8 +24,8 @@ EXPECTED_OUTPUT = {
     "A terrain": r"M5 +simulated +1/1",
     "A sensor": r"Complete\.",
     "A kernel or model": r"index\.html",
-    "A command": r"\blab\n(.|\n)*where +print the folder",
-    "A limit of the guard": r"The sole is 0\.\d+ m above the base > 0\.10",
+    "A command": r"\blab\n(.|\n)*where +print the data folder",
+    "A limit of the guard": r"The sole is 0\.\d+ m above the base \(limit 0\.10\)",
 }
 BLOCK = r"\n\n```\w*\n(?P<text>.*?)```"
 CHANGE = re.compile(

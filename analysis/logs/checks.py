@@ -10,12 +10,19 @@ import numpy as np
 
 from acquisition.errors import SettingsError
 from analysis.data.frozen_channels import frozen_channels
-from analysis.data.plausibility import SLOWEST, doubts_of, moment_doubts
+from analysis.data.plausibility import (
+    SHORTEST,
+    SLOWEST,
+    UNEVEN,
+    doubts_of,
+    moment_doubts,
+)
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import Array, TractionSeries
 from analysis.logs.clocks import lag_by_receipts
 from analysis.logs.estimates import (
     LONGEST_LAG,
+    SHORTEST_PATH,
     STEADY,
     SURE,
     Bools,
@@ -262,27 +269,33 @@ def normal_check(judged: AppliedImport) -> Check:
     pressed = judged.in_trials & (judged.values[:, 2] > PRESSED_FORCE)
     foot = judged.record.path.foot
     estimate = find_normal(foot[pressed])
-    warning = _tilt_warning(estimate, judged.axes[0])
+    warning = _tilt_warning(foot[pressed], judged.axes[0])
     if not warning:
         of_trials = {
-            f"T{number:02d}": find_normal(foot[first:end][pressed[first:end]])
+            f"T{number:02d}": foot[first:end][pressed[first:end]]
             for number, (first, end) in enumerate(judged.spans, 1)
         }
         warning = "; ".join(
             f"{name}: {text}"
-            for name, of_trial in of_trials.items()
-            if (text := _tilt_warning(of_trial, judged.axes[0]))
+            for name, path in of_trials.items()
+            if (text := _tilt_warning(path, judged.axes[0]))
         )
     return _check("normal", tuple(judged.axes[2].tolist()), "", estimate, warning)
 
 
-def _tilt_warning(normal: Estimate, x_T: Array) -> str:
-    """Compare along the path only: a straight one shows no tilt to its side."""
+def _tilt_warning(foot: Array, x_T: Array) -> str:
+    """Compare along the path only: a straight one shows no tilt to its side.
+
+    On a short path stones may deflect the foot by `UNEVEN`.
+    """
+    normal = find_normal(foot, SHORTEST)
     if not normal.value:
         return ""
-    along = float(np.array(normal.value) @ x_T)
-    tilt = math.degrees(math.asin(min(1.0, abs(along))))
+    along = min(1.0, abs(float(np.array(normal.value) @ x_T)))
+    tilt, length = math.degrees(math.asin(along)), float(np.ptp(foot @ x_T))
     if tilt <= LARGEST_TILT + normal.spread[0]:
+        return ""
+    if length < SHORTEST_PATH and length * along <= UNEVEN:
         return ""
     return (
         f"--normal is {tilt:.1f} degrees off the foot's path (limit "

@@ -271,21 +271,22 @@ def _explained(sums: Array) -> Array:
     return np.where(np.isfinite(share) & (s_xy > 0.0), share, 0.0)
 
 
-def find_normal(foot: Array) -> Estimate:
+def find_normal(foot: Array, shortest: float = SHORTEST_PATH) -> Estimate:
     """Estimate the ground normal in the base frame from the path of the pressed foot.
 
     Args:
         foot: positions of the pressed foot in the base frame [m], shape (n, 3).
+        shortest: length of path that is needed [m].
     """
     if len(foot) < 3:
         return nothing("the foot is never pressed")
     centred = foot - foot.mean(axis=0)
     _, _, axes = np.linalg.svd(centred, full_matrices=False)
     extents = np.ptp(centred @ axes.T, axis=0)
-    if extents[0] < SHORTEST_PATH:
+    if extents[0] < shortest:
         return nothing(
             f"the pressed foot moves {extents[0] * 1e3:.0f} mm, "
-            f"{SHORTEST_PATH * 1e3:.0f} mm are needed"
+            f"{shortest * 1e3:.0f} mm are needed"
         )
     is_wide = abs(axes[2, 2]) >= abs(axes[1, 2])  # sideways; a heave is no width
     is_plane = extents[1] >= _WIDE and is_wide

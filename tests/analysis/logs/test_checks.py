@@ -6,13 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from analysis.data.plausibility import SHORTEST, UNEVEN
 from analysis.logs.checks import (
     LARGEST_TILT,
     AppliedImport,
     normal_check,
     tare_check,
 )
-from analysis.logs.estimates import STEADY
+from analysis.logs.estimates import SHORTEST_PATH, STEADY
 from ft_sensor.payload import Payload
 
 ROWS = 200  # of a trial
@@ -30,9 +31,9 @@ def judged_of(foot, values, spans):
     return AppliedImport(record, spans, np.eye(3), payload, raw, force, values)
 
 
-def strokes(*slopes_deg):
-    """Strokes of 0.5 m, each on ground of one slope."""
-    ahead = np.linspace(0.0, 0.5, ROWS)
+def strokes(*slopes_deg, length=0.5):
+    """Strokes of `length` [m], each on ground of one slope."""
+    ahead = np.linspace(0.0, length, ROWS)
     level = np.zeros(ROWS)
     paths = [
         np.column_stack([ahead, level, np.tan(np.radians(slope)) * ahead])
@@ -52,6 +53,13 @@ def test_the_trial_whose_ground_has_another_slope_is_named():
     warning = normal_check(strokes(0.0, 5.0)).warning
     assert "T02: --normal is 5.0 degrees off" in warning
     assert "T01" not in warning
+
+
+@pytest.mark.parametrize("length", [1.01 * SHORTEST, 0.99 * SHORTEST_PATH])
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_a_short_path_may_rise_by_the_height_of_a_stone(length, share):
+    slope = np.degrees(np.arcsin(share * UNEVEN / length))
+    assert bool(normal_check(strokes(slope, length=length)).warning) is (share > 1.0)
 
 
 @pytest.mark.parametrize("load", [3.0, 10.0, 500.0])
