@@ -4,7 +4,8 @@ First the lag, with the arm idle: the foot is rocked about joint 6 in the air, s
 its weight rotates in the sensor frame. With s(t) = R(q(t))^T w from the positions, a
 sensor that lags by T reads f(t) = b + a s(t) - a T s'(t) + c s''(t); the last term is
 the foot's inertia. Then the arm holds with joint 7 locked, and the foot is turned about
-its axis: moment over angle is the lock's stiffness.
+its axis in two steps of the same direction: the further moment over the further angle
+is the lock's stiffness, because friction carries the same share of both.
 """
 
 from typing import Any
@@ -31,7 +32,7 @@ ROCKING_SECONDS = 10.0  # s, duration of rocking
 _POSE = 1  # index of `POSES`: the foot ahead
 # At 1 Hz the hysteresis of a sound sensor looks like a lag of up to 4 ms.
 _AMPLITUDE, _HALF = 0.3, 1.0 / 3.0  # rad, and s of half a period
-TURNED = 0.6  # N m, 6 N at 100 mm: friction supports a third of it
+TURNED = (0.3, 0.6)  # N m, 3 and 6 N at 100 mm; friction may carry 0.2
 _TURN_SECONDS = 60.0  # duration of a turn by simulated hands
 _SETTLED, _AVERAGE = 0.8, 0.3  # s, settling and averaging time
 _SWINGS = 2.0  # s, time to let go and for the foot to come to rest
@@ -93,16 +94,22 @@ def _rock(scene: Scene) -> Values:
 
 
 def _turn(scene: Scene) -> dict[str, NDArray[Any]]:
-    """Angles of joint 7 (3,) and moments (3, 3): released, turned, released.
+    """Angles of joint 7 (3,) and moments (3, 3): turned, turned further, released.
 
     Also the angle of joint 7 after the release, while it swings back.
     """
-    parts = [_measure(scene, "Hands off the foot, the arm holds itself. [space]", 0.0)]
-    text = (
-        f"Turn the foot about its own axis with about {TURNED:g} N m (6 N at 100 mm) "
-        "and keep it there. [space] while it is turned."
-    )
-    parts.append(_measure(scene, text, TURNED))
+    _ask(scene, "Hands off the foot, the arm holds itself. [space]")
+    scene.wait(_SETTLED)
+    asked = ("Turn the foot about its own axis with", "Turn it further, to")
+    parts = [
+        _measure(
+            scene,
+            f"{words} about {torque:g} N m ({10.0 * torque:g} N at 100 mm) and keep it "
+            "there. [space] while it is turned.",
+            torque,
+        )
+        for words, torque in zip(asked, TURNED, strict=True)
+    ]
     _ask(scene, "[space], then let the foot go at once.")
     reader = scene.rig.shared.cycles.reader()
     if scene.simulation is not None:
@@ -208,21 +215,19 @@ def _smooth(values: Array) -> Array:
 
 
 def lock_stiffness(values: Values) -> tuple[float, float]:
-    """Stiffness of the lock [N m/rad] and the applied moment [N m]."""
+    """Stiffness of the lock [N m/rad] and the further moment [N m]."""
     moments = number(values, "sign") * values["moments"] @ values["mounting"].T
-    about = moments[:, 2]
-    angles = values["turned"]
-    moment = float(about[1] - (about[0] + about[2]) / 2.0)
-    angle = float(angles[1] - (angles[0] + angles[2]) / 2.0)
+    moment = float(moments[1, 2] - moments[0, 2])
+    angle = float(values["turned"][1] - values["turned"][0])
     return (moment / angle if angle else np.inf), abs(moment)
 
 
 def ringing(values: Values) -> float:
     """Overshoot of joint 7 beyond its rest, relative to the angle it was turned."""
-    low, turned, _ = values["turned"].tolist()
+    turned = float(values["turned"][1])
     q = values["swing_q7"]
     rest = float(q[-_RESTS:].mean())
-    beyond = np.sign(low - turned) * (q - rest)
+    beyond = np.sign(rest - turned) * (q - rest)
     return float(max(beyond.max(), 0.0) / max(abs(turned - rest), 1e-9))
 
 

@@ -36,15 +36,15 @@ def rocked(lag=0.0, amplitude=0.3, seconds=10.0):
     }
 
 
-def turned(stiffness=20.0, moment=0.6, back=0.0):
-    """Recording of a foot that is turned and released."""
-    amplitude = moment / stiffness
+def turned(stiffness=20.0, moment=0.6, back=0.0, friction=0.0):
+    """Recording of a foot that is turned by half of a moment, by all, and released."""
+    half, amplitude = ((m - friction) / stiffness for m in (moment / 2.0, moment))
     rest = np.zeros(900)
     swing = amplitude * np.exp(-np.arange(100) / 20.0)
     swing[50] = -back * amplitude
     return {
-        "turned": np.array([0.1, 0.1 + amplitude, 0.1]),
-        "moments": np.array([[0, 0, 0.02], [0, 0, 0.02 + moment], [0, 0, 0.02]]),
+        "turned": 0.1 + np.array([half, amplitude, 0.0]),
+        "moments": np.array([[0, 0, 0.02 + m] for m in (moment / 2.0, moment, 0.0)]),
         "swing_q7": np.concatenate([swing, rest]) + 0.1,
         "ended": texts([]),
         "sign": np.array(1.0),
@@ -81,9 +81,14 @@ def test_a_recording_without_sensor_readings_fails():
     assert cause(**nothing).startswith("swing of the foot's weight")
 
 
-@pytest.mark.parametrize("stiffness", [9.5, 15.0, 33.0])
+@pytest.mark.parametrize("stiffness", [9.5, 15.0, 29.0])
 def test_a_lock_of_another_stiffness_is_reported(stiffness):
     assert cause(**turned(stiffness)).startswith("stiffness of joint 7's lock")
+
+
+def test_friction_does_not_change_the_stiffness():
+    stiffness, moment = lock_clock.lock_stiffness(turned(friction=0.25))
+    assert (stiffness, moment) == pytest.approx((20.0, 0.3))
 
 
 def test_an_oscillating_lock_is_reported():
