@@ -267,32 +267,33 @@ def clock_check(record: LegRecord) -> Check:
 def normal_check(judged: AppliedImport) -> Check:
     """Check the normal by the path of the pressed foot, together and in each trial."""
     pressed = judged.in_trials & (judged.values[:, 2] > PRESSED_FORCE)
-    foot = judged.record.path.foot
-    estimate = find_normal(foot[pressed])
-    warning = _tilt_warning(foot[pressed], judged.axes[0])
+    foot, x_T = judged.record.path.foot, judged.axes[0]
+    estimate = find_normal(foot[pressed], SHORTEST)
+    warning = _tilt_warning(estimate, foot[pressed] @ x_T, x_T)
     if not warning:
-        of_trials = {
-            f"T{number:02d}": foot[first:end][pressed[first:end]]
-            for number, (first, end) in enumerate(judged.spans, 1)
-        }
-        warning = "; ".join(
-            f"{name}: {text}"
-            for name, path in of_trials.items()
-            if (text := _tilt_warning(path, judged.axes[0]))
-        )
+        texts: list[str] = []
+        for number, (first, end) in enumerate(judged.spans, 1):
+            path = foot[first:end][pressed[first:end]]
+            text = _tilt_warning(find_normal(path, SHORTEST), path @ x_T, x_T)
+            texts += [f"T{number:02d}: {text}"] if text else []
+        warning = "; ".join(texts)
     return _check("normal", tuple(judged.axes[2].tolist()), "", estimate, warning)
 
 
-def _tilt_warning(foot: Array, x_T: Array) -> str:
+def _tilt_warning(normal: Estimate, ahead: Array, x_T: Array) -> str:
     """Compare along the path only: a straight one shows no tilt to its side.
 
     On a short path stones may deflect the foot by `UNEVEN`.
+
+    Args:
+        normal: estimate from the path of the pressed foot.
+        ahead: positions of the path along `x_T` [m], shape (n,).
+        x_T: stated direction of the slip, shape (3,).
     """
-    normal = find_normal(foot, SHORTEST)
     if not normal.value:
         return ""
     along = min(1.0, abs(float(np.array(normal.value) @ x_T)))
-    tilt, length = math.degrees(math.asin(along)), float(np.ptp(foot @ x_T))
+    tilt, length = math.degrees(math.asin(along)), float(np.ptp(ahead))
     if tilt <= LARGEST_TILT + normal.spread[0]:
         return ""
     if length < SHORTEST_PATH and length * along <= UNEVEN:
