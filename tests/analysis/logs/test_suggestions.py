@@ -24,20 +24,20 @@ def marks(tmp_path):
 def jumping(rows):
     """One joint state of another place."""
     joints = [row for row in rows if row[0] == "/joint_states"]
-    joints[2000][2].position[0] = 1.5
+    joints[1000][2].position[0] = 1.5
     return rows
 
 
 def stuck(rows):
     """The wrench of 6 s is repeated until 8 s."""
     times = [row for row in rows if row[0] == "/ft/wrench"]
-    for _, _, message in times[4800:6400]:
-        message.wrench.force.x = times[4800][2].wrench.force.x
-        message.wrench.force.y = times[4800][2].wrench.force.y
-        message.wrench.force.z = times[4800][2].wrench.force.z
-        message.wrench.torque.x = times[4800][2].wrench.torque.x
-        message.wrench.torque.y = times[4800][2].wrench.torque.y
-        message.wrench.torque.z = times[4800][2].wrench.torque.z
+    for _, _, message in times[2400:3200]:
+        message.wrench.force.x = times[2400][2].wrench.force.x
+        message.wrench.force.y = times[2400][2].wrench.force.y
+        message.wrench.force.z = times[2400][2].wrench.force.z
+        message.wrench.torque.x = times[2400][2].wrench.torque.x
+        message.wrench.torque.y = times[2400][2].wrench.torque.y
+        message.wrench.torque.z = times[2400][2].wrench.torque.z
     return rows
 
 
