@@ -242,3 +242,10 @@ def test_a_new_lock_has_its_reference_at_zero():
     assert lock.reference(0) == lock.reference(START) == 0.0
     lock.engage(0.0, START)
     assert lock.torque(0.01, 0.0, START) == 0.0
+
+
+def test_a_second_engage_does_not_move_the_reference(lock):
+    lock.engage(1.0, FULL)
+    for after in (1, 5):
+        assert lock.reference(FULL + after * S) == pytest.approx(0.4)
+    assert lock.torque(0.41, 0.0, FULL) == pytest.approx(-0.2, abs=1e-12)
