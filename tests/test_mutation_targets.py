@@ -15,7 +15,7 @@ def test_every_module_and_its_tests_exist():
     assert [name for name in sorted(named) if not (ROOT / name).exists()] == []
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("path", sorted({path for path, _ in EQUIVALENT}))
 def test_every_equivalent_mutation_can_still_be_made(path, monkeypatch):
     monkeypatch.setattr(mutation_check, "EQUIVALENT", {})

@@ -6,7 +6,7 @@ from tests.soak import soaked, summary
 
 MINUTE = 1 / 60  # h, simulated
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.long, pytest.mark.timeout(300)]
 
 
 def test_a_simulated_minute_with_faults_passes_every_check(tmp_path):

@@ -158,6 +158,7 @@ def test_without_pandas_the_extra_is_reported(session, monkeypatch):
 # --- plots ----------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_trial_is_drawn_with_force_above_and_velocity_below(session, tmp_path):
     figure = session[0].plot()
     above, below = figure.axes

@@ -28,7 +28,9 @@ def fastest(found):
     return float(np.quantile(found.trials[0].traction[:, 0], 0.999))
 
 
-@pytest.mark.parametrize("rate", [0.5, 0.8, 2.0])
+@pytest.mark.parametrize(
+    "rate", [0.8, *(pytest.param(rate, marks=pytest.mark.slow) for rate in (0.5, 2.0))]
+)
 def test_stamps_at_another_rate_are_refused_until_a_clock_is_stated(imported, rate):
     stroke_log = StrokeLog(stamp_rate=rate)
     with pytest.raises(SettingsError, match=rf"run at {rate:g} times") as error:

@@ -38,6 +38,7 @@ def test_a_paired_p_value_is_shown_with_the_adjusted_one():
     assert missing == "–"
 
 
+@pytest.mark.slow
 def test_the_note_states_the_number_of_comparisons(small_study):
     table = paired_table(small_study, "mae", "N")
     count = sum(text.count("Holm") for row in table.rows for text in row[1:])

@@ -21,6 +21,7 @@ OPTIONS = StudyOptions(fit=FitOptions(gp_points=80, models=TWO, draws=0), n_jobs
 PARAMETERS = ["mu", "F_s", "v_s", "delta_s", "b"]
 
 
+@pytest.mark.slow
 def test_stones_are_predicted_far_worse_than_a_plate(small_study):
     for model in (TUSTIN, GP_SE):
         maes = {name: r.mae(model) for name, r in small_study.terrains.items()}

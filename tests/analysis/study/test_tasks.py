@@ -36,7 +36,7 @@ def test_an_empty_list_of_tasks_is_accepted():
     assert run_tasks(square, [], None) == []
 
 
-@pytest.mark.parametrize("n_jobs", [1, 2])
+@pytest.mark.parametrize("n_jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_an_error_in_a_task_is_not_swallowed(n_jobs):
     with pytest.raises(ValueError, match="7"):
         run_tasks(fail, [7, 7], n_jobs)
@@ -59,6 +59,7 @@ def end_at_three(number):
     return number
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_is_reported_with_its_signal_and_replaced():
     with pytest.raises(WorkerLostError, match="ended unexpectedly: SIGKILL"):
         run_tasks(end_at_three, [1, 2, 3, 4, 5], 2)

@@ -117,6 +117,7 @@ def test_a_single_spike_does_not_decide():
     assert calm.sum() - wild.sum() < 60.0
 
 
+@pytest.mark.slow
 def test_different_terrains_are_distinguished_by_density(found):
     for levels in found.by_density.values():
         assert levels["terrain"].accuracy > 0.9
@@ -172,6 +173,7 @@ def test_a_posterior_is_a_probability(study):
     assert scores.terrains[int(posterior.argmax())] == "TF"
 
 
+@pytest.mark.slow
 def test_recorded_stones_decide_the_kind_of_a_terrain():
     # a plate called Sand, small stones called Beach and Gravel
     laws = {"Sand": ("TF", "none"), "Beach": ("S0", "small"), "Gravel": ("S0", "small")}

@@ -36,6 +36,7 @@ def drawn(copula, trials, rows, seed=1):
     ]
 
 
+@pytest.mark.slow
 def test_a_copula_is_recovered_from_its_scores():
     fitted = fit_copula(drawn(TRUE, 400, 800))
     assert fitted.level == pytest.approx(TRUE.level, abs=0.04)

@@ -11,6 +11,8 @@ from experiments.operator.prompts import Prompt
 from tests.experiments.built import watch_builds
 from tests.experiments.program import traction
 
+pytestmark = pytest.mark.slow
+
 TOP_SPEED = 0.5  # rad/s
 STOPPING = 0.08  # rad, from that speed to a stop
 FROZEN_FOR = 3.7  # s

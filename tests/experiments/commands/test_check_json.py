@@ -21,6 +21,7 @@ def test_the_page_of_a_fit_rig_is_json_and_nothing_else(tmp_path):
     assert page["software"]["commit"]
 
 
+@pytest.mark.slow
 def test_the_page_of_a_refused_rig_is_json_with_its_failed_checks(tmp_path):
     change = ('"socketcan"', '"no-such-adapter"')
     config = write_config(tmp_path, rig=change)

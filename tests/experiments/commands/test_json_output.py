@@ -93,6 +93,7 @@ def test_report_prints_its_results_as_json_and_nothing_else(recorded):
     assert content["terrains"]["TF"]["trials"] == 2
 
 
+@pytest.mark.slow
 def test_a_refused_report_prints_no_json(tmp_path):
     done = traction("report", "S009", "--json", "--data", tmp_path)
     assert (done.code, done.out) == (2, "")

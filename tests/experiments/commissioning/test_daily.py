@@ -85,7 +85,7 @@ def day(tool, seed, wrong="", torques=BEFORE, **changed):
     return values | changed
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_many_sound_arms_pass_on_another_day(tool):
     causes = [daily.judge(day(tool, seed)).cause for seed in range(SOUND)]
     assert causes == [""] * SOUND

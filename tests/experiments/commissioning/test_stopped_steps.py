@@ -42,9 +42,8 @@ def press_in(scene: Scene, mode: SafetyMode, button: str, seconds: float) -> Non
     scene.loop_client.on_tick.append(look)
 
 
-@pytest.mark.parametrize(
-    "button", ["estop", pytest.param("idle", marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("button", ["estop", "idle"])
 def test_a_stop_of_a_held_arm_gives_the_step_no_verdict(scene, tmp_path, button):
     files = RecordFolder.open(tmp_path, is_simulated=True)
     press_in(scene, SafetyMode.ACTIVE, button, 1.0)

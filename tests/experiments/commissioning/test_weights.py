@@ -47,7 +47,7 @@ def test_a_sound_arm_passes(tool, seed):
     assert list(causes(tool, seed)) == ["", "", ""]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_many_sound_arms_pass(tool):
     stopped = [seed for seed in range(SOUND) if any(causes(tool, seed))]
     assert stopped == []

@@ -111,6 +111,7 @@ def toy_measures():
     return study, measure_models(study)
 
 
+@pytest.mark.slow
 def test_own_errors_agree_with_the_study(toy_measures):
     study, measures = toy_measures
     plates = [study.terrains[n].mae(m) for m in (TUSTIN, GP_SE) for n in ("TF", "Tf")]
