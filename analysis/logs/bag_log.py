@@ -36,13 +36,13 @@ class BagLog(OneFile):
 
     format = "ROS 1 bag"
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, file: Path) -> None:
         """Scan the file once for its topics.
 
         Raises:
             SettingsError: a name is too long, or there are too many topics.
         """
-        super().__init__(path)
+        super().__init__(path, file)
         self._connections: dict[int, str] = {}
         for _ in self._records(set()):
             pass
@@ -53,7 +53,7 @@ class BagLog(OneFile):
         yield from self._records(set(topics))
 
     def _records(self, wanted: set[str]) -> Iterator[LogMessage]:
-        with open_regular(self.path, is_link_followed=True) as file:
+        with open_regular(self.file, is_link_followed=True) as file:
             file.read(len(MAGIC))
             offset = len(MAGIC)
             while True:

@@ -82,13 +82,14 @@ class LogFile(Protocol):
 class OneFile:
     """Base class of readers of a single file; see `LogFile`."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, file: Path) -> None:
         """Initialise an empty log.
 
         Args:
-            path: the file.
+            path: the file as given, which messages name.
+            file: the file that is read: the same, or its unpacked copy.
         """
-        self.path = path
+        self.path, self.file = path, file
         self.topics: dict[str, LogTopic] = {}
         self.losses: list[str] = []
         self.unread: dict[str, str] = {}

@@ -47,13 +47,13 @@ class McapLog(OneFile):
 
     format = "MCAP"
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, file: Path) -> None:
         """Scan the file once for its topics.
 
         Raises:
             SettingsError: a name is too long, or there are too many topics.
         """
-        super().__init__(path)
+        super().__init__(path, file)
         for _ in self.messages(()):
             pass
 
@@ -63,7 +63,7 @@ class McapLog(OneFile):
         wanted, sound_to = set(topics), len(MAGIC)
         definitions = _Definitions(self)
         readable = definitions.topics
-        with open_regular(self.path, is_link_followed=True) as file:
+        with open_regular(self.file, is_link_followed=True) as file:
             file.read(len(MAGIC))
             try:
                 for raw in records_in(file, LARGEST_PART):

@@ -113,16 +113,16 @@ def _files(path: Path) -> list[Path]:
 
 
 def _opened(path: Path, scratch: Path) -> LogFile:
-    start = _first_bytes(path)
+    file, start = path, _first_bytes(path)
     if start.startswith(ZSTD_MAGIC):
         _unpack_file(path, scratch)
-        path, start = scratch, _first_bytes(scratch)
+        file, start = scratch, _first_bytes(scratch)
     if start.startswith(MCAP_MAGIC):
-        return McapLog(path)
+        return McapLog(path, file)
     if start.startswith(sqlite_log.MAGIC):
-        return SqliteLog(path, scratch.with_suffix(".wal"))
+        return SqliteLog(path, file, scratch.with_suffix(".wal"))
     if start.startswith(bag_log.MAGIC):
-        return BagLog(path)
+        return BagLog(path, file)
     if start.startswith(b"#ROSBAG V1"):
         raise damaged(path, "a bag of format 1", "Convert it: rosbag migrate.")
     raise damaged(path, "not a known log format", _FORMATS)

@@ -33,19 +33,20 @@ class SqliteLog(OneFile):
 
     format = "rosbag2, SQLite"
 
-    def __init__(self, path: Path, scratch: Path) -> None:
+    def __init__(self, path: Path, file: Path, scratch: Path) -> None:
         """Read the list of topics.
 
         Args:
-            path: the database.
+            path: the file as given, which messages name.
+            file: the database: the same, or its unpacked copy.
             scratch: folder for a copy with the write-ahead log, if there is one.
 
         Raises:
             SettingsError: the file is not a rosbag2 log, is damaged, or has an
                 unfinished transaction.
         """
-        super().__init__(path)
-        self._uri = _uri_of(path, scratch)
+        super().__init__(path, file)
+        self._uri = _uri_of(file, scratch)
         self._numbers: dict[int, str] = {}
         with self._opened() as database:
             tables = {

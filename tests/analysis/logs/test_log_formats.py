@@ -1,5 +1,6 @@
 """Logs of another library are read whole, damaged and packed ones within bounds."""
 
+import os
 import sqlite3
 import struct
 
@@ -10,7 +11,7 @@ from mcap.writer import Writer
 
 from acquisition.errors import SettingsError
 from acquisition.trial_file.unpacking import DamageError, Unpacker
-from analysis.logs import bag_log, mcap_log
+from analysis.logs import bag_log, channels, mcap_log
 from analysis.logs.channels import read_channels
 from analysis.logs.log_file import LARGEST_PART, LARGEST_RATIO
 from analysis.logs.opening import open_log
@@ -147,11 +148,73 @@ def test_a_log_of_too_many_topics_is_refused(logs, monkeypatch, name, module, wo
     ],
 )
 def test_a_damaged_header_of_a_bag_ends_it(tmp_path, header, why):
+    assert losses_of_bag(tmp_path, struct.pack("<I", len(header)) + header) == why
+
+
+def test_a_record_beyond_the_limit_ends_a_bag(tmp_path):
+    size = LARGEST_PART + 1
+    assert (
+        losses_of_bag(tmp_path, struct.pack("<I", size)) == f"a record of {size} bytes"
+    )
+
+
+def test_a_record_that_exceeds_its_chunk_ends_a_bag(tmp_path):
+    inner = struct.pack("<I", 99)
+    fields = [b"op=\5", b"compression=none", b"size=" + struct.pack("<I", len(inner))]
+    header = b"".join(struct.pack("<I", len(field)) + field for field in fields)
+    chunk = struct.pack("<I", len(header)) + header
+    chunk += struct.pack("<I", len(inner)) + inner
+    assert losses_of_bag(tmp_path, chunk) == "a record exceeds its chunk"
+
+
+def losses_of_bag(tmp_path, records):
+    """Read a bag that ends at its first record; return why."""
     path = tmp_path / "a.bag"
-    path.write_bytes(bag_log.MAGIC + struct.pack("<I", len(header)) + header)
-    _, found, losses = read(path)
+    path.write_bytes(bag_log.MAGIC + records)
+    _, found, (loss,) = read(path)
     assert found == []
-    assert losses == [f"nothing is read after byte {len(bag_log.MAGIC)}: {why}"]
+    return loss.removeprefix(f"nothing is read after byte {len(bag_log.MAGIC)}: ")
+
+
+def test_a_topic_of_too_many_messages_is_refused(logs, monkeypatch):
+    monkeypatch.setattr(channels, "MOST_MESSAGES", 5)
+    with open_log(logs["bag"]) as log:
+        topics = log.topics
+        joints, wrench = topics["/joint_states"], topics[WRENCH]
+        with pytest.raises(SettingsError, match="over 5 messages of /"):
+            read_channels(log, joints, ["slide_x"], wrench, None)
+
+
+@pytest.mark.parametrize("beside", ["", "-wal", "-journal"])
+def test_a_pipe_is_refused_at_once(logs, tmp_path, beside):
+    (file,) = logs["db3"].glob("*.db3")
+    path = tmp_path / file.name
+    if beside:
+        path.write_bytes(file.read_bytes())
+    os.mkfifo(f"{path}{beside}")
+    with pytest.raises(SettingsError, match="regular file") as error:
+        read(path)
+    assert f"{path}{beside}: " in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("damage", "why"),
+    [
+        (lambda data: data[:-1000], "cannot be read as a database"),
+        (
+            lambda data: data[:6] + bytes(20) + data[26:],
+            "a packed part that is damaged",
+        ),
+    ],
+    ids=["cut", "overwritten"],
+)
+def test_a_damaged_packed_log_is_refused_by_its_own_name(logs, tmp_path, damage, why):
+    (file,) = logs["db3-file"].glob("*.zstd")
+    path = tmp_path / file.name
+    path.write_bytes(damage(file.read_bytes()))
+    with pytest.raises(SettingsError) as error:
+        read(path)
+    assert f"{path}: {why}" in str(error.value)
 
 
 def test_a_message_that_is_text_ends_a_database(logs, tmp_path):
