@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 
-from experiments.commissioning.evidence.gate import COMPLETE, FIELD
+from experiments.commissioning.evidence.record import COMPLETE, FIELD
 
 _UNKNOWN = "uncommissioned: recorded without a commissioning"
 

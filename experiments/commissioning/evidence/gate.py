@@ -16,16 +16,18 @@ from experiments.commissioning.evidence.order import (
     StepId,
     input_names_of,
 )
-from experiments.commissioning.evidence.record import Commissioning, read_commissioning
+from experiments.commissioning.evidence.record import (
+    COMPLETE,
+    FIELD,
+    Commissioning,
+    read_commissioning,
+)
 from experiments.dates import is_ahead, is_fresh
 from experiments.messages import preflight_error
 from experiments.operator.console import BAD, GOOD, WARNING, AddLine
 from experiments.rig.requests import LastAnswers
 from experiments.rig.rig import Rig
 from wam.driver.startup import ArmInfo
-
-FIELD = "commissioning"  # in the metadata of a recording
-COMPLETE = "complete"  # value of a complete commissioning
 
 
 @dataclass(frozen=True, slots=True)

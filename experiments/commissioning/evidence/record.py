@@ -19,6 +19,8 @@ from acquisition.validation import Entries, Many, first_problem
 from experiments.commissioning.evidence.order import ORDER, StepId
 
 NAME = "commissioning.json"
+FIELD = "commissioning"  # in the metadata of a recording
+COMPLETE = "complete"  # value of a complete commissioning
 _LARGEST = 4_000_000  # bytes
 _FIRST = "0" * 64  # digest before the first step
 _ANEW = "Put back the file as it was written, or do it again: traction commission."
