@@ -183,11 +183,8 @@ def _export_sessions(args: argparse.Namespace, console: Console) -> int:
     from experiments.export.standard_topics import export_standard_topics
     from experiments.export.terrain_database import export_terrains
     from experiments.export.trial_tables import export_sessions
-    from experiments.report.choices import (
-        ReportRequest,
-        choose_sessions,
-        report_missing,
-    )
+    from experiments.report.choices import ReportRequest
+    from experiments.report.chosen_sessions import choose_sessions, report_missing
     from experiments.settings.load import load_settings
 
     every = args.to is None and not args.sessions

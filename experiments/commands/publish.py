@@ -47,11 +47,8 @@ def run(args: argparse.Namespace) -> int:
     from experiments.export.credits import LICENCES, parse_author
     from experiments.export.publication import PublishRequest, publish_sessions
     from experiments.operator.console import Console
-    from experiments.report.choices import (
-        ReportRequest,
-        choose_sessions,
-        report_missing,
-    )
+    from experiments.report.choices import ReportRequest
+    from experiments.report.chosen_sessions import choose_sessions, report_missing
     from experiments.settings.load import load_settings
 
     authors = [parse_author(text) for text in args.author]

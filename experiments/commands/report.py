@@ -19,6 +19,12 @@ EXAMPLES = """\
   traction report S012                             one session, in its own folder
   traction report --all --what-if smoothing=25     the study with another choice"""
 
+# arguments that select the data or the output
+_OTHER = frozenset(
+    {"run", "command", "sessions", "all", "data", "config", "to"}
+    | {"json", "no_color", "verbose", "allow_missing"}
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `report`."""
@@ -62,39 +68,34 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _report(args: argparse.Namespace) -> None:
-    from analysis.tables.columns import parse_covariates
     from experiments.operator.console import Console, PageRecorder
-    from experiments.report.choices import (
-        ReportRequest,
-        analysis_choices,
-        choose_sessions,
-        report_missing,
-    )
-    from experiments.report.covariates import KNOWN
-    from experiments.report.sessions import report_sessions
+    from experiments.report.chosen_sessions import choose_sessions, report_missing
     from experiments.report.up_to_date import record_of
     from experiments.settings.load import load_settings
 
-    choices = analysis_choices(args)
     console = PageRecorder() if args.json else Console(color=not args.no_color)
     data = Path(args.data)
     sessions = choose_sessions(data, args.sessions, every=args.all)
-    wanted = ReportRequest(
-        args.seed,
-        [row.name for row in load_settings(args.config).matrix.terrains],
-        args.scheduler,
-        choices,
-        covariates=()
-        if args.covariate is None
-        else parse_covariates(args.covariate, KNOWN),
-        out=args.to,
-        with_pdf=args.pdf,
-    )
-    record = record_of(sessions, data, wanted)  # before the data are read
+    terrains = [row.name for row in load_settings(args.config).matrix.terrains]
+    options = f"{terrains} {_options(args)}"
+    record = record_of(sessions, data, args.to, options)  # before the data are read
     if not args.json and record.is_current():
         console.say("The report is up to date: its data and options are the same.")
         console.say(f"Open in a browser: {record.page}")
         return
+    # slow to import, and not needed for a report that is up to date
+    from experiments.report.choices import ReportRequest, analysis_choices
+    from experiments.report.sessions import report_sessions
+
+    wanted = ReportRequest(
+        args.seed,
+        terrains,
+        args.scheduler,
+        analysis_choices(args),
+        covariates=_covariates(args.covariate),
+        out=args.to,
+        with_pdf=args.pdf,
+    )
     missing = report_missing(sessions, console, allow_missing=args.allow_missing)
     page = report_sessions(sessions, data, replace(wanted, missing=missing), console)
     if not missing and not _left_out(page):  # report missing data every time
@@ -104,6 +105,22 @@ def _report(args: argparse.Namespace) -> None:
         Console(color=False).say(_as_json(page, names, missing))
     else:
         console.say(f"Open in a browser: {page}")
+
+
+def _options(args: argparse.Namespace) -> str:
+    """Return the options that affect the content of a report, as given."""
+    given = sorted(vars(args).items())
+    return repr([(name, value) for name, value in given if name not in _OTHER])
+
+
+def _covariates(text: str | None) -> tuple[str, ...]:
+    """Return the columns named by `--covariate`."""
+    if text is None:
+        return ()
+    from analysis.tables.columns import parse_covariates
+    from experiments.report.covariates import KNOWN
+
+    return parse_covariates(text, KNOWN)
 
 
 def _left_out(page: Path) -> list[str]:

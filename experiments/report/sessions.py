@@ -15,7 +15,8 @@ from analysis.study.models import FitOptions
 from analysis.study.store import MAX_STORE_BYTES, ResultStore
 from analysis.study.study import Study, StudyOptions, run_study
 from experiments.operator.console import Console
-from experiments.report.choices import ReportRequest, folder_of
+from experiments.report.choices import ReportRequest
+from experiments.report.chosen_sessions import folder_of
 from experiments.report.commissioned import uncommissioned
 from experiments.report.covariates import recorded_columns
 from experiments.report.duplicates import TrialDigests
@@ -161,7 +162,7 @@ def report_sessions(
         SettingsError: the folder cannot be written.
         MissingLibraryError: the extra `report` is not installed.
     """
-    out = folder_of(sessions, data, request)
+    out = folder_of(sessions, data, request.out)
     require_folder(out)
     if request.out is not None and not (out / FOLDS).is_dir():
         make_empty(out)  # it is no earlier report

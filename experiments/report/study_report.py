@@ -3,6 +3,7 @@
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +16,17 @@ from analysis.report.results import compute_results
 from analysis.report.section import ReportTable
 from analysis.report.sections.beyond_paper.further_columns import covariate_tables
 from analysis.report.sections.rig_health.health import RigTrial
-from analysis.report.sections.sensitivity import comparison_table, plain_choice
+from analysis.report.sections.sensitivity import (
+    StudyVariant,
+    comparison_table,
+    plain_choice,
+)
 from analysis.study.store import ResultStore
-from analysis.study.study import Study
+from analysis.study.study import Study, run_study
 from experiments.operator.console import Console
-from experiments.report.choices import ReportRequest, repeat_study
+from experiments.report.choices import ReportRequest
 from experiments.report.covariates import columns_tested
+from experiments.report.progress import fitting
 from experiments.session.store import iso_utc
 
 
@@ -99,7 +105,7 @@ def report_study(
 
     study = reported.study
     variants = request.choices.variants
-    others = repeat_study(study, reported.trials, variants, console, store)
+    others = _repeat_study(study, reported.trials, variants, console, store)
     tested = columns_tested(
         study, reported.with_columns, request.covariates, console, store
     )
@@ -127,3 +133,22 @@ def report_study(
         store=store,
     )
     return write_report(study, out, context)
+
+
+def _repeat_study(
+    study: Study,
+    trials: Mapping[str, Iterable[RecordedTrial | TractionSeries]],
+    choices: Sequence[StudyVariant],
+    console: Console,
+    store: ResultStore | None = None,
+) -> list[tuple[StudyVariant, Study]]:
+    """Return a study of the same trials under each choice."""
+    others: list[tuple[StudyVariant, Study]] = []
+    for choice in choices:
+        console.say(f"What if {choice.text}: fitting ...")
+        series = {name: [choice.series(t) for t in ts] for name, ts in trials.items()}
+        options = choice.options(study.options)
+        with fitting(console) as progress:
+            other = run_study(series, options, study.simulated, progress, store)
+        others.append((choice.with_remark(chain(*trials.values())), other))
+    return others

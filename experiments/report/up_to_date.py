@@ -11,7 +11,7 @@ from pathlib import Path
 from acquisition.errors import SettingsError
 from acquisition.files import read_regular
 from analysis.study.store import sources_digest, write_atomic
-from experiments.report.choices import ReportRequest, folder_of
+from experiments.report.chosen_sessions import folder_of
 from experiments.session.store import FOLDS, SessionFolder
 
 _ROOT = Path(__file__).parents[2]
@@ -64,18 +64,25 @@ class ReportRecord:
 
 
 def record_of(
-    sessions: Sequence[SessionFolder], data: Path, request: ReportRequest
+    sessions: Sequence[SessionFolder], data: Path, out: Path | None, options: str
 ) -> ReportRecord:
-    """Return the record of a report of `sessions` as they are now."""
-    digest = hashlib.sha256(f"{_program()} {request!r}".encode())
+    """Return the record of a report of `sessions` as they are now.
+
+    Args:
+        sessions: sessions of the report.
+        data: folder of the data.
+        out: folder of the report; None = that of the session, or of the study.
+        options: everything else that affects the report, as text.
+    """
+    digest = hashlib.sha256(f"{_program()} {options}".encode())
     for session in sessions:
         digest.update(f"\n{session.path.resolve()}".encode())
         for path in _recorded_files(session.path):
             digest.update(f"\n{path} {_stamp(path)}".encode())
-    out = folder_of(sessions, data, request)
-    name = hashlib.sha256(str(out.resolve()).encode()).hexdigest()
-    path = (request.out or data) / FOLDS / f"report-{name}.json"
-    return ReportRecord(out, path, digest.hexdigest())
+    folder = folder_of(sessions, data, out)
+    name = hashlib.sha256(str(folder.resolve()).encode()).hexdigest()
+    path = (out or data) / FOLDS / f"report-{name}.json"
+    return ReportRecord(folder, path, digest.hexdigest())
 
 
 def _recorded_files(folder: Path) -> Iterable[Path]:
