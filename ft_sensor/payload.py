@@ -11,9 +11,12 @@ in the base frame and g_w = (0, 0, -g):
 Only `to_base` transforms out of the sensor frame: F = R_WS F_c.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +24,11 @@ from numpy.typing import NDArray
 from acquisition.control_loop.law import FootObserver
 from acquisition.devices import ArmReading, WrenchSample
 from acquisition.sample import Sample
-from wam.model.arm_model import ArmModel
 from wam.model.constants import GRAVITY, Array
 from wam.model.tool import Tool
+
+if TYPE_CHECKING:  # slow to import, and most commands do not move an arm
+    from wam.model.arm_model import ArmModel
 
 Floats = NDArray[np.float64]
 
@@ -62,7 +67,7 @@ class Payload:
         object.__setattr__(self, "_gravity_map", gravity_map)
         object.__setattr__(self, "_signs", np.full(6, self.sign))
 
-    def tared(self, reading: Floats, rotation_base_7: Array) -> "Payload":
+    def tared(self, reading: Floats, rotation_base_7: Array) -> Payload:
         """Return the payload with the bias from a reading without contact.
 
         Args:
@@ -133,7 +138,7 @@ class TerrainFrame:
         rows = np.array([[-ca, 0.0, -sa], [0.0, -1.0, 0.0], [-sa, 0.0, ca]])
         return rows @ yaw.T
 
-    def from_other_end(self) -> "TerrainFrame":
+    def from_other_end(self) -> TerrainFrame:
         """Return the frame of a push in the opposite direction, from the other end."""
         end = np.array(self.start) + self.travel * self.axes()[0]
         x, y, z = end.tolist()
