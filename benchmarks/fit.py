@@ -10,7 +10,7 @@ import statistics
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -62,7 +62,7 @@ def many_starts(rows: SampleTable) -> float:
         low[k], high[k] = np.log(pairs[k])
 
     def residual(x: np.ndarray) -> np.ndarray:
-        parameters = TustinParameters(x[0], x[1], *np.exp(x[2:4]), x[4])
+        parameters = TustinParameters(*[*x[:2], *np.exp(x[2:4]), x[4]])
         return predict(parameters, rows.F_n, rows.v_t) - rows.F_t
 
     rng = np.random.default_rng(1)
@@ -121,7 +121,7 @@ def parts(rounds: int) -> list[SpeedComparison]:
     starts = {part: three_starts(part, X, y) for part in KERNELS}
 
     def sklearn_likelihood(part: str) -> float:
-        model = fit_sklearn(part, X, y, starts[part])
+        model: Any = fit_sklearn(part, X, y, starts[part])
         return float(model.log_marginal_likelihood_value_)
 
     return [
@@ -157,9 +157,9 @@ def evaluation_function(X: np.ndarray, y: np.ndarray) -> Callable[[], float]:
 def evaluation(X: np.ndarray, y: np.ndarray, rounds: int) -> SpeedComparison:
     """Compare one likelihood evaluation with its gradient against scikit-learn's."""
     theta = three_starts("SE fit", X, y)[0]
-    model = GaussianProcessRegressor(
-        sklearn_kernel("SE fit", theta, float(y.std())), alpha=1e-10, optimizer=None
-    ).fit(X, y)
+    kernel = sklearn_kernel("SE fit", theta, float(y.std()))
+    unfitted: Any = GaussianProcessRegressor
+    model = unfitted(kernel, alpha=1e-10, optimizer=None).fit(X, y)
     fitted = model.kernel_.theta
     return SpeedComparison(
         "evaluation",
@@ -246,7 +246,9 @@ def main() -> None:
     if arguments.keep_heap:
         keep_heap()
     with threadpool_limits(1):
-        results = [part.measured() for part in parts(arguments.rounds)]
+        results: list[dict[str, Any]] = [
+            part.measured() for part in parts(arguments.rounds)
+        ]
         results.append(
             race(arguments.whole, arguments.share)
             if arguments.whole

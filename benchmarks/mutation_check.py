@@ -20,6 +20,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -75,7 +76,7 @@ class Mutation:
     source: str
 
 
-def _changes(node: ast.AST) -> Iterator[Callable[[ast.AST], None]]:
+def _changes(node: ast.AST) -> Iterator[Callable[[Any], None]]:
     """Yield the possible changes of a node, as functions applied to its copy."""
     if isinstance(node, ast.Compare) and type(node.ops[0]) in _FLIPPED:
         yield lambda n: n.ops.__setitem__(0, _FLIPPED[type(n.ops[0])]())
@@ -246,7 +247,7 @@ def sample(count: int, seed: int, round_number: int, only: str) -> list[Mutation
 
 def main() -> int:
     """Print every mutation and the share that was killed."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--count", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--round", type=int, default=0, help="round of this seed")

@@ -95,8 +95,8 @@ def best_of_twenty(likelihood: Likelihood, seed: int) -> float:
     near = np.clip(np.column_stack([centre - 2.3, centre + 2.3]).T, *box.T)
     rng, half = np.random.default_rng(seed), _STARTS // 2
     starts: list[Array] = [
-        *rng.uniform(*box.T, (half, box.shape[0])),
-        *rng.uniform(*near, (half, box.shape[0])),
+        *rng.uniform(box[:, 0], box[:, 1], (half, box.shape[0])),
+        *rng.uniform(near[0], near[1], (half, box.shape[0])),
     ]
     posterior = Posterior(likelihood)
     return max(climb(posterior, start, box).value for start in starts)

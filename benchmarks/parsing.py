@@ -78,7 +78,7 @@ def scan_us(device: SerialDevice, stream: list[tuple[int, bytes]]) -> float:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--frames", type=int, default=20_000)
     frames = parser.parse_args().frames
     print("sensor      scan us  with date us  goal us  x rate")

@@ -36,6 +36,7 @@ GOAL_US = 160.0  # per cycle of four substeps
 SUBSTEPS = 4
 _EFFECTIVE_MASS = 0.30  # kg
 _SETTLING = 1000  # cycles to put the foot down
+_TOUCHING = 0.05  # normal force of a foot on the ground [N]
 _SEED, _TERRAIN, _TRIAL = 1, "S0", 1
 _FRAME = TerrainFrame(0.0, 0.0, (0.70, 0.0, 0.12), 0.45)
 _START = np.array([0.0, 0.7696, 0.0, 1.1857, 0.0, 1.1863, 0.0])
@@ -145,7 +146,7 @@ def _run(cycles: int, notes: Notes | None) -> Iterator[float]:
             notes.states.append((plant.q, plant.qd))
         yield _cycle(plant, model)
         if notes is not None:
-            notes.is_touching.append(plant.is_touching)
+            notes.is_touching.append(plant.contact_force[2] > _TOUCHING)
 
 
 def _note_views(plant: ArmPlant, notes: Notes) -> None:

@@ -52,7 +52,7 @@ def are_near_a_stall(moments: Times, stalls: Times) -> NDArray[np.bool_]:
     near = (moments[:, None] >= (ends - lengths - NEAR_NS)[None, :]) & (
         moments[:, None] <= (ends + NEAR_NS)[None, :]
     )
-    return near.any(axis=1)
+    return np.any(near, axis=1)
 
 
 @dataclasses.dataclass(slots=True)

@@ -31,6 +31,7 @@ from benchmarks.rows import BenchRow
 MAIN = "acquisition.recording.recorder_process:main"
 BURST_NS = 10_000_000
 PAGE_KB = os.sysconf("SC_PAGE_SIZE") / 1024
+_WRENCH = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
 HEADER = TrialHeader(
     trial={"session": "bench"},
     utc_offset_ns=0,
@@ -61,7 +62,7 @@ class Load:
         sample.velocity[:] = self._noise[number % 991]
         self._shared.cycles.write(sample.payload())
         for _ in range(2):
-            wrench = WrenchSample(now_ns, number, (1.0,) * 6, 0, True, False)
+            wrench = WrenchSample(now_ns, number, _WRENCH, 0, True, False)
             self._shared.wrenches.write(pack_wrench(wrench))
         data = number.to_bytes(8, "little")
         self._tape.add([(0x400 + frame, data, now_ns) for frame in range(13)])

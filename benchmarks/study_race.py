@@ -206,7 +206,7 @@ def run_sklearn(
     held_out = rows.standardised(SampleTable.joined(task.test_trials))
     likelihoods = {}
     for name, (part, _) in FITS.items():
-        model = fit_sklearn(part, rows.X, rows.outputs[name], starts[name])
+        model: Any = fit_sklearn(part, rows.X, rows.outputs[name], starts[name])
         model.predict(tested)
         model.predict(held_out, return_std=True)
         likelihoods[name] = float(model.log_marginal_likelihood_value_)
