@@ -168,7 +168,7 @@ def miss_rows(record: RealtimeRecord, stalls: Times) -> list[Row]:
     allowed = 1.5 * len(in_c) * count / in_c_count + 5
     return [
         Row(
-            "missed, not are_near_a_stall",
+            "missed, not near a stall",
             "<= 100 per million",
             f"{unexplained} of {count} ({per_million:.0f} per million)",
             per_million <= 100,
