@@ -1,5 +1,7 @@
 """The force that accelerates the foot, and trials without it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from acquisition.trial_file.reader import TrialReader
 from analysis.data.inertia import WINDOW, inertial_force
 from analysis.data.load import load_trial
 from analysis.report.sections.sensitivity import parse_choice
+from ft_sensor.payload import payload_of
 from tests.analysis.data.test_load import (
     BIAS,
     FORCE,
@@ -88,6 +91,14 @@ def test_an_inertia_corrected_trial_has_only_the_ground_force(shaken):
     removed = np.abs(shaken.without_inertia().force - FORCE)[inner].max()
     assert kept > 0.3
     assert removed < 0.1 * kept
+
+
+def test_the_inertial_force_does_not_depend_on_the_mounting(shaken):
+    """The same foot below a sensor that was mounted at another angle."""
+    turned = payload_of(replace(TOOL, sensor_angle=-0.8))
+    mounted = replace(shaken.payload, rotation=turned.rotation, com=turned.com)
+    other = replace(shaken, payload=mounted).inertial_force()
+    assert other.force == pytest.approx(shaken.inertial_force().force, abs=1e-9)
 
 
 def test_the_correction_is_reported_with_its_uncertainty(shaken):

@@ -22,6 +22,7 @@ TOOL = Tool(
     Body(0.136, np.array([0.0, 0.0, 0.006]), np.diag([7e-5, 7e-5, 1.4e-4])),
     Body(0.45, np.array([0.01, 0.0, 0.062]), np.diag([4e-4, 5.5e-4, 4.5e-4])),
     np.array([0.01, 0.0, 0.112]),
+    sensor_angle=0.6,  # so that no frame is another one
 )
 MODEL = ArmModel(CONSTANTS, TOOL)
 FRAME = TerrainFrame(0.1, 0.2, (0.7, 0.1, 0.12), 0.45)

@@ -9,7 +9,7 @@ from analysis.tables.loading import load_tables
 from tests.analysis.logs.gantry import StrokeLog, write_bag, write_bag2, write_urdf
 from tests.experiments.program import traction
 
-LOG = StrokeLog(strokes=2)
+LOG = StrokeLog(strokes=2, joint_rate=500.0, wrench_rate=800.0)
 
 
 @pytest.fixture(scope="module")

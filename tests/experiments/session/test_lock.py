@@ -4,9 +4,13 @@ import signal
 import pytest
 
 from acquisition.errors import SessionError
+from experiments.operator.console import Console
+from experiments.run.resume import ResumeRequest, close, redo, resume_session
+from experiments.session.annotations import add_note, change_verdict
 from experiments.session.lock import owner_of, session_lock
 from experiments.session.store import create_session
 from tests.experiments.program import traction
+from tests.experiments.session.test_unfinished import START
 
 
 @pytest.fixture
@@ -66,6 +70,25 @@ def test_a_lock_is_not_taken_twice_in_one_process(folder):
         session_lock(folder),
     ):
         pytest.fail("two have it")
+
+
+CHANGES = {
+    "note": lambda folder, _: add_note(folder, "", "hello", "Ada"),
+    "verdict": lambda folder, _: change_verdict(folder, "T01", "reject", "why", "Ada"),
+    "close": lambda folder, request: close(folder, "why", request.console),
+    "resume": resume_session,
+    "redo": lambda folder, request: redo(folder, 1, "why", request),
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_a_session_open_elsewhere_is_not_changed(folder, tmp_path, name):
+    folder.append_event(START)
+    before = folder.journal_text()
+    request = ResumeRequest(tmp_path, None, Console(color=False), is_fake=True)
+    with session_lock(folder), pytest.raises(SessionError, match="is open in"):
+        CHANGES[name](folder, request)
+    assert folder.journal_text() == before
 
 
 def test_a_damaged_lock_file_does_not_block_a_session(folder):
