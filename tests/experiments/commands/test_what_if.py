@@ -6,8 +6,8 @@ from tests.experiments.program import traction
 
 
 @pytest.mark.parametrize("text", ["colour=red", "smoothing=4", "frame=base", "window"])
-def test_unknown_choices_are_refused_with_the_list(tmp_path, text):
-    done = traction("report", "--all", "--data", tmp_path, "--what-if", text)
+def test_unknown_choices_are_refused_with_the_list(recorded, text):
+    done = traction("report", "--all", "--data", recorded.data, "--what-if", text)
     assert done.code != 0
     assert "--what-if" in done.err
     assert "Traceback" not in done.err
