@@ -20,9 +20,18 @@ EXAMPLES = """\
   traction report --all --what-if smoothing=25     the study with another choice"""
 
 # arguments that select the data or the output
-_OTHER = frozenset(
-    {"run", "command", "sessions", "all", "data", "config", "to"}
-    | {"json", "no_color", "verbose", "allow_missing"}
+_OTHER = (
+    "run",
+    "command",
+    "sessions",
+    "all",
+    "data",
+    "config",
+    "to",
+    "json",
+    "no_color",
+    "verbose",
+    "allow_missing",
 )
 
 

@@ -310,5 +310,5 @@ def test_a_wrench_that_ends_in_a_trial_is_reported(imported, until, rows):
     (text,) = missing
     assert "of 2000 rows" in text
     count = int(text.removeprefix("T01: ").partition(" ")[0])
-    assert count == pytest.approx(rows, abs=20)
+    assert count == pytest.approx(rows, abs=10)
     assert "the first at 7.9" in text or "the first at 8.0" in text

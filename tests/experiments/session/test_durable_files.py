@@ -1,9 +1,10 @@
-"""What is synchronised to the disk is all that was written."""
+"""A file is complete when it is synchronised to the disk."""
 
 import os
 
 import pytest
 
+from acquisition.trial_file.recover import recover_file
 from experiments.session.data_files import write_json, write_new, write_text
 from experiments.session.store import create_session
 from tests.acquisition.trials import make_cycles, write_trial
@@ -29,6 +30,10 @@ def flush_trial(folder):
     return writer.partial
 
 
+def recover_trial(folder):
+    return recover_file(flush_trial(folder)).path
+
+
 WRITERS = {
     "an event of the journal": append_twice,
     "a replaced file": lambda folder: write_text(folder / "a.json", "text"),
@@ -36,6 +41,7 @@ WRITERS = {
     "a new file": lambda folder: write_new(folder / "a.json", b"text"),
     "a finished trial": finish_trial,
     "a part of a trial": flush_trial,
+    "a recovered trial": recover_trial,
 }
 
 
