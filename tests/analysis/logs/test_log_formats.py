@@ -3,6 +3,7 @@
 import os
 import sqlite3
 import struct
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,8 +14,10 @@ from acquisition.errors import SettingsError
 from acquisition.trial_file.unpacking import DamageError, Unpacker
 from analysis.logs import bag_log, channels, mcap_log
 from analysis.logs.channels import read_channels
-from analysis.logs.log_file import LARGEST_PART, LARGEST_RATIO
+from analysis.logs.log_file import LARGEST_PART, LARGEST_RATIO, copy_bounded
 from analysis.logs.opening import open_log
+from analysis.logs.record import RECORD, read_record
+from analysis.logs.robot import read_urdf
 from tests.analysis.logs.gantry import StrokeLog, write_bag, write_bag2
 
 SHORT = StrokeLog(joint_rate=100.0, wrench_rate=100.0)
@@ -195,6 +198,25 @@ def test_a_pipe_is_refused_at_once(logs, tmp_path, beside):
     with pytest.raises(SettingsError, match="regular file") as error:
         read(path)
     assert f"{path}{beside}: " in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "read_file"),
+    [("leg.urdf", read_urdf), (RECORD, lambda path: read_record(path.parent))],
+    ids=["urdf", "record"],
+)
+def test_a_pipe_beside_a_log_is_refused_at_once(tmp_path, name, read_file):
+    os.mkfifo(tmp_path / name)
+    with pytest.raises(SettingsError, match="is not a regular file") as error:
+        read_file(tmp_path / name)
+    assert str(tmp_path / name) in str(error.value)
+
+
+def test_a_full_disk_ends_the_copy_of_a_log(tmp_path):
+    path = tmp_path / "log.db3"
+    path.write_bytes(bytes(10))
+    with pytest.raises(SettingsError, match="cannot be copied .*No space left"):
+        copy_bounded([path], [Path("/dev/full")])
 
 
 @pytest.mark.parametrize(
