@@ -215,7 +215,7 @@ def test_a_pipe_beside_a_log_is_refused_at_once(tmp_path, name, read_file):
 def test_a_full_disk_ends_the_copy_of_a_log(tmp_path):
     path = tmp_path / "log.db3"
     path.write_bytes(bytes(10))
-    with pytest.raises(SettingsError, match="cannot be copied .*No space left"):
+    with pytest.raises(SettingsError, match=r"cannot be copied .*No space left"):
         copy_bounded([path], [Path("/dev/full")])
 
 
