@@ -507,7 +507,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "no effect on the arm",
             (
-                "tests/experiments/session/test_random_kills.py::test_a_few_random_kills_lose_no_kept_trial",
+                "tests/experiments/session/test_derivation.py::test_a_session_killed_at_any_write_is_completed_without_loss",
             ),
         ),
     },

@@ -302,8 +302,15 @@ def made_up(name, number, rng):
     )
 
 
-@pytest.mark.parametrize("surface", [ROCKY_GROUND, FLAT_GROUND])
-@pytest.mark.parametrize("trials", [10, pytest.param(40, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("surface", "trials"),
+    [
+        (ROCKY_GROUND, 10),
+        (FLAT_GROUND, 10),
+        pytest.param(ROCKY_GROUND, 40, marks=pytest.mark.slow),
+        pytest.param(FLAT_GROUND, 40, marks=[pytest.mark.slow, pytest.mark.long]),
+    ],
+)
 def test_the_rejection_rate_of_held_out_windows_is_the_allowed_one(surface, trials):
     shares = []
     for seed in range(8):

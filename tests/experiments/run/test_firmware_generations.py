@@ -7,7 +7,7 @@ from tests.experiments.other_arms import firmware, serve
 from tests.experiments.program import only_session, run_short, traction
 from tests.wam.driver.test_generations import DOCUMENTED
 
-SHORT = {min(DOCUMENTED), 60, 61, 250}
+SHORT = {min(DOCUMENTED), 61, 250}
 REQUEST = {vers: "1A" if vers < 61 else "30" for vers in DOCUMENTED}
 
 

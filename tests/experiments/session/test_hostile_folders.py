@@ -145,10 +145,15 @@ def test_a_file_beyond_its_size_limit_is_reported(data, config, name):
     [
         '{"history": 5, "notes": 7, "attempt": 1}',
         '{"attempt": NaN}',
-        "1" * 5000,
-        '{"attempt": %s}' % ("9" * 4301),
-        '{"attempt": 1, "ratio": 1e999}',
         "[]",
+        *(
+            pytest.param(content, marks=pytest.mark.long)
+            for content in (
+                "1" * 5000,
+                '{"attempt": %s}' % ("9" * 4301),
+                '{"attempt": 1, "ratio": 1e999}',
+            )
+        ),
     ],
     ids=lambda text: text[:30],
 )

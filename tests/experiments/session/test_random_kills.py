@@ -45,15 +45,9 @@ def run_or_resume(config, data):
     return seen.done.code
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(300)
-def test_a_few_random_kills_lose_no_kept_trial(tmp_path, config):
-    assert survive(tmp_path, config, 8, np.random.default_rng(7)) >= 1
-
-
 @pytest.mark.long
 @pytest.mark.timeout(1800)
-def test_many_random_kills_lose_no_kept_trial(tmp_path, config):
+def test_random_kills_lose_no_kept_trial(tmp_path, config):
     assert survive(tmp_path, config, 200, np.random.default_rng(8)) >= 10
 
 
