@@ -6,9 +6,10 @@ import pytest
 from acquisition.devices import MotorChange, SafetyMode
 from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
-from wam.bus.frames import MOTOR_NODES, Group, group_id
+from wam.bus.frames import MOTOR_NODES, Group, Property, group_id
 from wam.bus.properties import PuckMode
 from wam.driver.arm import WamArm
+from wam.driver.command_watch import CommandWatch
 
 HOME_COUNTS = (0, -36833, 36832, -36728, 0, 0, 0)
 CYCLE_NS = 2_000_000
@@ -125,3 +126,17 @@ def test_a_puck_that_cannot_be_idled_keeps_its_torque_and_loses_its_power(driven
     assert network.safety_mode is SafetyMode.E_STOP
     assert network.driven() == []
     assert driven.arm.safety_mode() is SafetyMode.E_STOP
+
+
+def test_a_suspicion_is_confirmed_only_by_a_later_report_of_the_module():
+    watch = CommandWatch()
+    watch.begin([None] * 7, [200] * 7)
+    watch.note_sent([0] * 7)
+    node, number = watch.question()
+    wrong = Property(number, 99)
+    assert watch.judge(node, wrong, 5, 5) is None
+    for active_ns in (4, 5):
+        assert watch.is_to_be_confirmed(active_ns)
+        assert watch.judge(node, wrong, 6, active_ns) is None
+    assert not watch.is_to_be_confirmed(6)
+    assert watch.judge(node, wrong, 7, 6) is not None

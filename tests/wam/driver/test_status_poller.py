@@ -355,3 +355,11 @@ def test_only_the_contradicting_puck_resolves_the_contradiction(
     poller.contradict([2])
     poller.on_frame(property_reply_id(node), encode_reply(8, reported, is_wide=False))
     assert (poller.mode, poller.contradicted_by) == (mode, contradicted_by)
+
+
+def test_an_arm_without_power_contradicts_no_report_of_idle():
+    poller = StatusPoller(Bus(), ArmSettings())
+    poller.contradict([2])
+    for mode in (SafetyMode.E_STOP, SafetyMode.IDLE):
+        poller.on_frame(property_reply_id(10), encode_reply(8, mode, is_wide=False))
+        assert (poller.mode, poller.contradicted_by) == (mode, set())
