@@ -129,10 +129,11 @@ def decode_command(data: bytes) -> tuple[int, bytes] | None:
 
 def find_answer(data: bytes, command: int) -> bytes | None:
     """Return the 15 content bytes of the newest reply to `command`, or None."""
-    for start in range(len(data) - FRAME_SIZE, -1, -1):
-        if is_packet(data, start) and data[start + 1] == command:
-            return data[start + 2 : start + 17]
-    return None
+    begin = bytes((SOP, command))
+    start = data.rfind(begin)
+    while start >= 0 and not is_packet(data, start):
+        start = data.rfind(begin, 0, start + 1)
+    return data[start + 2 : start + 17] if start >= 0 else None
 
 
 def text_of(content: bytes) -> str:
