@@ -26,6 +26,9 @@ from acquisition.trial_file.data_files import (
     read_data,
 )
 
+# Without either, a number is below 1e200 * 1e99.
+_MAY_OVERFLOW = re.compile(rb"[eE]\+?[0-9]{3}|[0-9]{200}")
+
 
 def read_json(path: Path) -> dict[str, Any]:
     """Return a JSON object, an empty one if the file is missing or damaged.
@@ -43,8 +46,12 @@ def read_json(path: Path) -> dict[str, Any]:
 
 def parse_object(text: bytes) -> dict[str, Any] | None:
     """Return the JSON object in `text`; None if it is none or contains NaN."""
+    # A call per number takes longer than all the rest.
+    checked = _finite if _MAY_OVERFLOW.search(text) else None
     try:
-        value: object = json.loads(text, parse_constant=_finite, parse_float=_finite)
+        value: object = json.loads(
+            text.decode("utf-8-sig"), parse_constant=_finite, parse_float=checked
+        )
     except (ValueError, RecursionError):
         return None
     return cast("dict[str, Any]", value) if isinstance(value, dict) else None
@@ -222,13 +229,29 @@ def journal_line(event: Mapping[str, object], number: int) -> bytes:
     return body[:-1] + crc
 
 
-def parse_line(line: bytes) -> dict[str, Any] | None:
-    """Return the event of a line; None if it is torn or its checksum is wrong."""
-    event = _parse_numbered(line)
-    if event is not None:
-        event.pop(_NUMBER, None)
+def parse_journal(text: bytes) -> tuple[list[dict[str, Any]], list[str]]:
+    """Return the events of a journal, and the faults in its lines.
+
+    Torn lines and lines of a wrong checksum are left out. A torn line is the trace of a
+    kill and no fault.
+    """
+    events: list[dict[str, Any]] = []
+    faults: list[str] = []
+    is_numbered = True
+    for number, line in enumerate(text.splitlines(), 1):
+        event = _parse_numbered(line)
+        if event is None:
+            if is_numbered and parse_object(line) is not None:
+                faults.append(f"has a wrong checksum in line {number}")
+            continue
+        stated = event.pop(_NUMBER, None)
         event.pop(_VERSION, None)
-    return event
+        events.append(event)
+        if is_numbered and stated != number:
+            was = f"line {stated}" if type(stated) is int else "of no number"
+            faults.append(f"lacks lines or has others: line {number} was {was}")
+            is_numbered = False  # the following ones are shifted, too
+    return events, faults
 
 
 def journal_problem(text: bytes) -> str:
@@ -252,23 +275,3 @@ def _parse_numbered(line: bytes) -> dict[str, Any] | None:
         return None
     del event[_CRC]
     return event
-
-
-def line_faults(text: bytes) -> list[str]:
-    """Describe the faults in the lines of a journal.
-
-    A torn line is the trace of a kill and no fault.
-    """
-    faults: list[str] = []
-    for number, line in enumerate(text.splitlines(), 1):
-        event = _parse_numbered(line)
-        if event is None:
-            if parse_object(line) is not None:
-                faults.append(f"has a wrong checksum in line {number}")
-            continue
-        stated = event.get(_NUMBER)
-        if stated != number:
-            was = f"line {stated}" if type(stated) is int else "of no number"
-            faults.append(f"lacks lines or has others: line {number} was {was}")
-            break
-    return faults

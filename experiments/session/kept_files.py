@@ -9,11 +9,15 @@ from typing import Any, cast
 
 from acquisition.errors import SessionError, TrialFileError
 from acquisition.trial_file.data_files import is_there, list_folder
-from experiments.session.data_files import line_faults, read_json, sha256_of
-from experiments.session.reducer import replay
+from experiments.session.data_files import read_json, sha256_of
 from experiments.session.sidecar import KEEP, Attempt, TrialName, checksum_and_size
 from experiments.session.states import Event
-from experiments.session.store import JOURNAL_FILE, SUMMARY_FILE, SessionFolder
+from experiments.session.store import (
+    JOURNAL_FILE,
+    SUMMARY_FILE,
+    JournalContent,
+    SessionFolder,
+)
 
 _NAMED = 6  # deviations in one message
 _Facts = Mapping[str, Any]
@@ -45,7 +49,9 @@ class Deviation:
 
 
 def compare_kept(
-    folder: SessionFolder, digest: Callable[[Path], str] = sha256_of
+    folder: SessionFolder,
+    digest: Callable[[Path], str] = sha256_of,
+    journal: JournalContent | None = None,
 ) -> list[Deviation]:
     """Return every kept trial that is missing or changed, in the order of trials.
 
@@ -54,28 +60,30 @@ def compare_kept(
     Args:
         folder: the session.
         digest: function that computes the checksum of a file.
+        journal: its journal, if it was read already.
     """
     try:
-        return [Deviation(folder.id, *pair) for pair in _compare(folder, digest)]
+        content = journal or folder.journal()
+        pairs = _compare(folder, content, digest)
+        return [Deviation(folder.id, *pair) for pair in pairs]
     except TrialFileError as error:
         return [unreadable(folder, error)]
 
 
 def _compare(
-    folder: SessionFolder, digest: Callable[[Path], str]
+    folder: SessionFolder, journal: JournalContent, digest: Callable[[Path], str]
 ) -> list[tuple[str, str]]:
     """Return (file, problem) of every deviation.
 
     Raises:
-        TrialFileError: the journal or a folder cannot be read.
+        TrialFileError: a folder cannot be read.
     """
-    events, text = folder.events(), folder.journal_text()
-    state = replay(events)
-    faults = [(JOURNAL_FILE, fault) for fault in line_faults(text)]
-    if (deviation := name_contradiction(folder, events)) is not None:
+    state = journal.state
+    faults = [(JOURNAL_FILE, fault) for fault in journal.faults]
+    if (deviation := name_contradiction(folder, journal.events)) is not None:
         faults.append((deviation.file, deviation.problem))
     judged = {attempt.name for attempt in state.attempts if attempt.verdicts}
-    faults += _unknown_to_journal(folder, text, {name.kept for name in judged})
+    faults += _unknown_to_journal(folder, journal.text, {n.kept for n in judged})
     for attempt in state.kept_trials:
         try:
             faults += _check_trial(folder, attempt, digest)
@@ -179,7 +187,7 @@ def stated_id(folder: SessionFolder) -> str:
 def repeated_trials(folder: SessionFolder, original: SessionFolder) -> set[str]:
     """Names of the trials that a copied session shares with its original."""
     sums = [
-        {kept.name.kept: kept.sha256 for kept in replay(session.events()).kept_trials}
+        {kept.name.kept: kept.sha256 for kept in session.journal().state.kept_trials}
         for session in (folder, original)
     ]
     return {name for name, sha256 in sums[0].items() if sums[1].get(name) == sha256}

@@ -7,6 +7,7 @@ from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +26,11 @@ from acquisition.trial_file.data_files import (
 from experiments.session.data_files import (
     journal_line,
     journal_problem,
-    parse_line,
+    parse_journal,
     sha256_of,
     writing,
 )
-from experiments.session.reducer import replay
+from experiments.session.reducer import SessionState, replay
 from experiments.session.sidecar import Attempt
 
 JOURNAL_FILE = "events.jsonl"
@@ -42,6 +43,26 @@ _FOLDER = re.compile(
 )
 LONGEST_NAME = 64
 MAX_EVENTS = 50_000
+
+
+@dataclass(frozen=True)
+class JournalContent:
+    """A journal as read from the disk.
+
+    Attributes:
+        text: its bytes, empty if there is none.
+        events: its events, without torn lines and lines of a wrong checksum.
+        faults: faults in its lines.
+    """
+
+    text: bytes
+    events: list[dict[str, Any]]
+    faults: list[str]
+
+    @cached_property
+    def state(self) -> SessionState:
+        """The state of the session after its events."""
+        return replay(self.events)
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,8 +139,8 @@ class SessionFolder:
             raise TrialFileError(path, f"has more than {MAX_EVENTS} lines")
         return text
 
-    def events(self) -> list[dict[str, Any]]:
-        """Return the journal without torn lines and lines of a wrong checksum.
+    def journal(self) -> JournalContent:
+        """Return the content of the journal.
 
         Raises:
             TrialFileError: as `journal_text`, or the journal has another version.
@@ -127,8 +148,15 @@ class SessionFolder:
         text = self.journal_text()
         if problem := journal_problem(text):
             raise TrialFileError(self.path / JOURNAL_FILE, problem)
-        lines = map(parse_line, text.splitlines())
-        return [event for event in lines if event is not None]
+        return JournalContent(text, *parse_journal(text))
+
+    def events(self) -> list[dict[str, Any]]:
+        """Return the events of the journal.
+
+        Raises:
+            TrialFileError: as `journal`.
+        """
+        return self.journal().events
 
     def kept_trials(self, digest: Callable[[Path], str] | None = None) -> list[Path]:
         """Return the files of the kept trials with the right checksum, in order.
@@ -139,7 +167,7 @@ class SessionFolder:
         Args:
             digest: function that computes a checksum; None = `sha256_of`.
         """
-        kept = replay(self.events()).kept_trials
+        kept = self.journal().state.kept_trials
         files = (self.find_kept(attempt, digest or sha256_of) for attempt in kept)
         return [path for path in files if path is not None]
 

@@ -118,13 +118,14 @@ def summarise(
         unreadable,
     )
     from experiments.session.lock import owner_of
-    from experiments.session.reducer import replay
     from experiments.session.unfinished import is_unfinished
 
-    deviations = tuple(compare_kept(folder, digest)) if digest else ()
+    deviations: tuple[Deviation, ...] = ()
     try:
-        events = folder.events()
-        state = replay(events)
+        journal = folder.journal()
+        state = journal.state
+        if digest:
+            deviations = tuple(compare_kept(folder, digest, journal))
         kept = [a for a in state.kept_trials if digest and folder.find_kept(a, digest)]
         owner_of(folder)
         return SessionSummary(
@@ -132,9 +133,9 @@ def summarise(
             rejected=state.rejected,
             is_resumable=is_unfinished(state),
             operator=state.operator,
-            phase=str(state.phase) if events else "opening",
+            phase=str(state.phase) if journal.events else "opening",
             deviations=deviations,
-            problem=name_contradiction(folder, events),
+            problem=name_contradiction(folder, journal.events),
         )
     except TrialFileError as error:
         return SessionSummary(deviations=deviations, problem=unreadable(folder, error))

@@ -98,7 +98,8 @@ def test_a_journal_may_have_its_limit_of_lines(tmp_path):
 def test_json_has_no_nan_and_bounded_integers():
     assert parse_object(b'{"a": %s}' % (b"9" * 4300)) is not None
     assert parse_object(b'{"a": %s}' % (b"9" * 4301)) is None
-    for value in (b"NaN", b"Infinity", b"-Infinity", b"1e999"):
+    overflowing = (b"1e999", b"-1E+0309", b"9" * 309 + b".0", b"9" * 210 + b".5e99")
+    for value in (b"NaN", b"Infinity", b"-Infinity", *overflowing):
         assert parse_object(b'{"a": %s}' % value) is None
 
 

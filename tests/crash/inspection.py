@@ -6,7 +6,7 @@ from pathlib import Path
 
 from acquisition.clock import SystemClock
 from experiments.session.crash_recovery import recover_session
-from experiments.session.data_files import parse_line
+from experiments.session.data_files import parse_journal
 from experiments.session.journal import open_journal
 from experiments.session.lock import session_lock
 from experiments.session.reducer import replay
@@ -55,7 +55,7 @@ def _is_trial(path: Path) -> bool:
 
 def events_in(journal: bytes) -> list[dict]:
     """Return the events of a journal."""
-    return [event for event in map(parse_line, journal.splitlines()) if event]
+    return parse_journal(journal)[0]
 
 
 def kept_checksums(events: Sequence[dict]) -> dict[tuple[int, int], str]:

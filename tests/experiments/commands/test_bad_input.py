@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mcap.writer import Writer
 
-from experiments.session.data_files import journal_line, parse_line, write_json
+from experiments.session.data_files import journal_line, parse_journal, write_json
 from experiments.session.store import create_session
 from tests.experiments.program import (
     digest,
@@ -261,7 +261,7 @@ def update_checksums(path):
     write_json(path.with_suffix(".json"), sidecar(path) | now)
     journal = path.parents[1] / "events.jsonl"
     number = int(path.stem[1:])
-    events = map(parse_line, journal.read_bytes().splitlines())
+    events, _ = parse_journal(journal.read_bytes())
     lines = [
         journal_line(
             event | now if "sha256" in event and event["trial"] == number else event,

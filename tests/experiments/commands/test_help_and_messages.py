@@ -28,7 +28,7 @@ from experiments.rig.build import build_tool
 from experiments.rig.requests import ExchangeTimes
 from experiments.run import ready, runner
 from experiments.run import tare as taring
-from experiments.session.data_files import journal_line, parse_line
+from experiments.session.data_files import journal_line, parse_journal
 from experiments.session.lock import session_lock
 from experiments.session.reducer import replay
 from experiments.session.store import list_sessions
@@ -456,7 +456,8 @@ def _complete(scene):
     """Make the kept trial the last one, and cut the end of the session's journal."""
     path = scene.folder / "events.jsonl"
     first, *rest, _ = path.read_bytes().splitlines(keepends=True)
-    start = journal_line({**(parse_line(first) or {}), "trials": 1}, 1)
+    ((begun,), _) = parse_journal(first)
+    start = journal_line({**begun, "trials": 1}, 1)
     path.write_bytes(b"".join([start, *rest]))
     summary = scene.folder / "session.json"
     fields = {**json.loads(summary.read_text()), "events": 1 + len(rest)}

@@ -9,7 +9,7 @@ import shutil
 import pytest
 
 from acquisition.errors import TrialFileError
-from experiments.session.data_files import journal_line, parse_line, sha256_of
+from experiments.session.data_files import journal_line, parse_journal, sha256_of
 from experiments.session.kept_files import (
     KeptDataError,
     check_kept,
@@ -114,7 +114,7 @@ def replace_by_link(session):
 def change_terrain(session):
     """Make the first line of the journal name another terrain."""
     first, *rest = lines(session)
-    event = {k: v for k, v in parse_line(first).items() if k not in {"line", "crc"}}
+    ((event,), _) = parse_journal(first)
     write_lines(session, [journal_line({**event, "terrain": "S0"}, 1), *rest])
 
 
@@ -246,9 +246,8 @@ def test_a_torn_last_line_is_no_deviation(session):
 
 @pytest.mark.parametrize("name", ["2027-01-15_S001_TF", "2027-01-15_S001_S0.fake"])
 def test_a_folder_name_that_contradicts_the_journal_is_reported(data, session, name):
-    first = parse_line(lines(session)[0])
-    plain = {k: v for k, v in first.items() if k not in {"line", "crc"}}
-    line = journal_line({**plain, "fake": {"seed": 1}}, 1)
+    ((first,), _) = parse_journal(lines(session)[0])
+    line = journal_line({**first, "fake": {"seed": 1}}, 1)
     write_lines(session, [line, *lines(session)[1:]])
     session.path.rename(session.path.with_name(name))
     (renamed,) = list_sessions(data)
