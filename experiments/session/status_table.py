@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
 
+from acquisition.errors import TrialFileError
+from acquisition.trial_file.data_files import list_folder
 from experiments.session.store import list_sessions
 from experiments.session.summaries import (
+    Checksums,
     SessionEntry,
     facts_of,
     recorded_facts,
@@ -21,29 +27,48 @@ if TYPE_CHECKING:
 
     from analysis.data.terrain_kinds import Value
     from experiments.session.kept_files import Deviation
+    from experiments.session.store import SessionFolder
     from experiments.settings.matrix import MatrixSettings, TerrainRow
 
 EVERYTHING = Where()
 
 
 def summarise_sessions(
-    data: Path, where: Where, digest: Callable[[Path], str]
+    data: Path, where: Where, digest: Checksums
 ) -> list[SessionEntry]:
     """Return all sessions below `data`, oldest number first.
 
     Args:
         data: the data folder.
         where: checksums are computed only for sessions with these values.
-        digest: function that computes the checksum of a file.
+        digest: the checksums computed so far.
     """
-    seen: list[SessionEntry] = []
-    for folder in list_sessions(data):
-        is_asked = where.matches(facts_of(folder))
-        summary = (
-            summarise(folder, digest) if is_asked else summarise_unverified(folder)
-        )
-        seen.append(SessionEntry(folder, summary))
-    return _counted_once(seen)
+    folders = list_sessions(data)
+    asked = [folder for folder in folders if where.matches(facts_of(folder))]
+    _compute_checksums(asked, digest)
+    return _counted_once(
+        [
+            SessionEntry(
+                folder,
+                summarise(folder, digest)
+                if folder in asked
+                else summarise_unverified(folder),
+            )
+            for folder in folders
+        ]
+    )
+
+
+def _compute_checksums(folders: Sequence[SessionFolder], digest: Checksums) -> None:
+    """Let `digest` remember the checksums of all kept trials, on all cores.
+
+    Whatever cannot be read is reported when it is needed.
+    """
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for folder in folders:
+            with suppress(TrialFileError):
+                for path in list_folder(folder.trials, "T??.mcap"):
+                    pool.submit(digest, path)
 
 
 def _counted_once(seen: list[SessionEntry]) -> list[SessionEntry]:
