@@ -46,7 +46,7 @@ class SessionRunner:
             details: fields of its event in the journal.
         """
         context = self._context
-        context.journal.append(opening, **details)
+        context.append(opening, **details)
         code, reason = 1, "bug"
         try:
             self._record_all()

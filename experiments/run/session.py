@@ -123,11 +123,15 @@ def run_session(request: SessionRequest, mode: OpenMode) -> int:
         operator = request.operator
         with handle_signals(stop), keyboard(operator), ExitStack() as stack:
             stack.callback(host_faults.restore)
-            journal = _open_journal(request, mode, rig, stack, host_faults)
-            if mode.journal is None:
-                write_conditions(journal.folder, {**rig_conditions(rig), **sensor})
-            metadata = _write_metadata(request, page, journal)
             console_loop = ConsoleLoop(rig, console, operator, stop, hand, faults)
+
+            def open_session() -> tuple[Journal, SessionMetadata]:
+                journal = _open_journal(request, mode, rig, stack, host_faults)
+                if mode.journal is None:
+                    write_conditions(journal.folder, {**rig_conditions(rig), **sensor})
+                return journal, _write_metadata(request, page, journal)
+
+            journal, metadata = console_loop.run_in_background(open_session)
             runner = SessionRunner(console_loop, metadata, journal)
             code = runner.run(mode.event, **_opening_fields(request, mode, differences))
     for plan in faults.plans if faults is not None else ():
