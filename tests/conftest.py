@@ -5,7 +5,6 @@ import gc
 import json
 import os
 import shutil
-import signal
 from collections.abc import Generator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests.background import restore_signals
 from tests.stalls import WallClock
 
 if TYPE_CHECKING:
@@ -29,13 +29,8 @@ settings.load_profile("untimed")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Repeat tests after a stall, and restore the handling of signals.
-
-    A shell that starts the suite in the background, or nohup, makes it ignore signals
-    that tests send, and every program that a test starts would inherit that.
-    """
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    """Repeat tests after a stall, and restore the handling of signals."""
+    restore_signals()
     config.pluginmanager.register(WallClock(), "wall-clock")
 
 

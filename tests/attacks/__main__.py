@@ -23,6 +23,7 @@ from pathlib import Path
 
 from tests.attacks.attack import Attack
 from tests.attacks.tables import TABLES
+from tests.background import restore_signals
 from tests.faults.printed import text
 
 HAZARDS = "hazards"
@@ -50,6 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not options.run:
         _print("\n".join(markdown([rows[n] for n in numbers])))
         return 0
+    restore_signals()
     failed = _run(options.table, numbers, options.jobs)
     return 1 if failed else 0
 

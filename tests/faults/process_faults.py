@@ -51,6 +51,7 @@ DAILY = {
     ("SIGINT", "preflight"),
     ("SIGTERM", "recording"),
     ("terminal closed", "idle"),
+    ("fsync of 200 ms", "idle"),
 }
 
 # The program, with an operator that waits at one prompt until the fault has occurred.

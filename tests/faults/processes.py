@@ -31,8 +31,8 @@ TABLE: dict[str, tuple[Cell, ...]] = {
     "sensor reader killed": _row(_LOST, _EARLY, _LEFT_OUT),
     "SIGINT": _row(_STOPPED, _BEFORE, _LEFT_OUT),
     "SIGINT twice": _row(_STOPPED, _BEFORE, _LEFT_OUT),
-    "SIGTERM": _row(_STOPPED, _NO_ARM, _LEFT_OUT),
-    "SIGHUP": _row(_STOPPED, _NO_ARM, _LEFT_OUT),
-    "terminal closed": _row(_STOPPED, _NO_ARM, replace(_LEFT_OUT, text="")),
+    "SIGTERM": _row(_STOPPED, _BEFORE, _LEFT_OUT),
+    "SIGHUP": _row(_STOPPED, _BEFORE, _LEFT_OUT),
+    "terminal closed": _row(_STOPPED, _BEFORE, replace(_LEFT_OUT, text="")),
     "fsync of 200 ms": _row(Cell(End.COMPLETE), Cell(End.COMPLETE)),
 }
