@@ -98,6 +98,7 @@ class Child:
             env={**os.environ, **ONE_THREAD},
         )
         theirs.close()
+        self._unanswered_s = 0.0  # time after which it was killed [s]
         self.channel.send(dict(settings))
 
     @property
@@ -110,21 +111,33 @@ class Child:
         """Whether the process is running."""
         return self._process.poll() is None
 
-    def ask(self, request: Request[Answer]) -> Answer:
+    def ask(self, request: Request[Answer], seconds: float | None = None) -> Answer:
         """Send a request to the process's `Dispatcher` and return the answer.
+
+        Args:
+            request: the request.
+            seconds: time after which a process that does not answer is killed; None =
+                never.
 
         Raises:
             TractionError: raised by the process.
             ProcessLostError: the process has ended.
         """
         try:
-            return ask(self.channel, request)
+            return ask(self.channel, request, seconds)
+        except TimeoutError:
+            self._unanswered_s = seconds or 0.0
+            self._process.kill()
+            self.channel.close()
+            raise ProcessLostError(self.name, self.exit_reason()) from None
         except ChannelClosedError:
             self._wait(_PATIENCE)
             raise ProcessLostError(self.name, self.exit_reason()) from None
 
     def exit_reason(self) -> str:
         """Return how the process ended: a signal, or its last error line."""
+        if self._unanswered_s:
+            return f"killed after {self._unanswered_s:.0f} s without an answer"
         code = self._process.poll()
         if code is not None and code < 0:
             return f"killed by {signal.Signals(-code).name}"
@@ -145,7 +158,7 @@ class Child:
         self.channel.close()
         if not self._wait(_PATIENCE):
             self._process.kill()
-            self._process.wait()
+            self._wait(_PATIENCE)  # one that waits for a broken disk does not end
         if self._stderr >= 0:
             os.close(self._stderr)
             self._stderr = -1

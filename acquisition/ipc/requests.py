@@ -94,15 +94,25 @@ class Dispatcher:
         return self._handlers[name]
 
 
-def ask(channel: Channel, request: Request[Answer]) -> Answer:
+def ask(
+    channel: Channel, request: Request[Answer], seconds: float | None = None
+) -> Answer:
     """Send a request to the `Dispatcher` behind `channel` and return the answer.
+
+    Args:
+        channel: channel to the peer.
+        request: the request.
+        seconds: longest time to wait for the answer; None = no limit.
 
     Raises:
         TractionError: raised by the peer.
         ChannelClosedError: the peer has closed the channel.
+        TimeoutError: no answer within `seconds`.
     """
     kind = type(request)
     channel.send([kind.__name__, _adapter(kind).dump_python(request, mode="json")])
+    if seconds is not None and not channel.is_readable(seconds):
+        raise TimeoutError
     answer = channel.receive()
     if answer["error"] is not None:
         raise _decode_error(answer["error"])

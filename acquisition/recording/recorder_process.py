@@ -20,6 +20,7 @@ from acquisition.trial_file.verify import VerifiedFile
 
 DRAIN_S = 0.02
 NICE = 5
+ANSWER_S = 20.0  # s; a recorder that is silent for longer waits for a broken disk
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +91,8 @@ def main(context: ChildContext) -> None:
 class RemoteRecorder:
     """A recorder in another process; implements `TrialRecording`.
 
-    During a trial its status is read from shared memory, without blocking calls.
+    During a trial its status is read from shared memory, without blocking calls. A
+    recorder that does not answer is killed and reported as lost.
     """
 
     def __init__(self, child: Child, shared: SharedLayout) -> None:
@@ -105,24 +107,24 @@ class RemoteRecorder:
 
     def start(self, path: Path, header: TrialHeader) -> None:
         """Begin a file with the last second of samples."""
-        self._child.ask(StartRecording(path.resolve(), header))
+        self._child.ask(StartRecording(path.resolve(), header), ANSWER_S)
         self._is_recording = True
 
     def event(self, level: int, name: str, text: str) -> None:
         """Write an event with the present time, if a file is open."""
-        self._child.ask(WriteEvent(level, name, text))
+        self._child.ask(WriteEvent(level, name, text), ANSWER_S)
 
     def finish(self, stop_reason: str) -> VerifiedFile:
         """End, verify and publish the file."""
         self._is_recording = False
-        return self._child.ask(FinishRecording(stop_reason))
+        return self._child.ask(FinishRecording(stop_reason), ANSWER_S)
 
     def abandon(self) -> None:
         """Stop recording; the data so far are kept as `.partial`."""
         if self._is_recording:
             self._is_recording = False
             if self._child.is_alive:
-                self._child.ask(AbandonRecording())
+                self._child.ask(AbandonRecording(), ANSWER_S)
 
     @property
     def largest_backlog(self) -> int:

@@ -12,6 +12,7 @@ from acquisition.control_loop.faults import OK, Action, Fault, GuardVerdict
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import SHORTED
 from acquisition.errors import TractionError
+from acquisition.ipc.child import ProcessLostError
 from acquisition.ipc.loop_client import LoopClient
 from experiments.messages import fault_words
 from experiments.operator.console import WARNING, Console
@@ -400,7 +401,8 @@ class ConsoleLoop:
         command.
         """
         backend = self.rig.backend
-        backend.recorder.abandon()
+        with suppress(ProcessLostError):  # reported already
+            backend.recorder.abandon()
         is_confirmed = backend.idle()
         if not self.loop_client.loop.is_running:
             return is_confirmed

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from acquisition.clock import RATE_HZ
-from acquisition.control_loop.faults import Action
+from acquisition.control_loop.faults import Action, Fault
 from acquisition.control_loop.states import ArmState
 from acquisition.errors import TractionError, TrialFileError
 from acquisition.ipc.child import ProcessLostError
@@ -99,6 +99,8 @@ def record_trial(context: RunContext, name: TrialName) -> TrialOutcome:
         if fault.verdict.action is Action.END_TRIAL:  # the arm still floats
             context.loop_client.request(ArmState.HOLD)
         outcome.reason = fault.verdict.reason
+        if fault.verdict.fault is Fault.RECORDER_SILENT:  # `_end` may have to wait
+            context.say(f"{WARNING} {context.fault_text(fault.verdict)}")
         _end(context, name, header, outcome)
         raise
     except StopRequestedError:
@@ -131,8 +133,12 @@ def _record(
         details["reset"] = [step for n, step in steps if n in context.state.ticked]
         context.state.ticked.clear()
     context.append(Event.TRIAL_STARTED, **details)
-    recorder.start(path, header)
-    recorder.event(20, "operator", "trial started")
+
+    def begin() -> None:
+        recorder.start(path, header)
+        recorder.event(20, "operator", "trial started")
+
+    console_loop.run_in_background(begin)
     context.loop_client.watch_trial(is_recording=True)
     context.feedback.give(FeedbackSignal.START)
     console_loop.show(recording_screen(context.rig, name.kept, outcome))
@@ -186,11 +192,15 @@ def _end(
     context.loop_client.watch_trial(is_recording=False)
     context.loop_client.advance(TICK)  # writes the newest metadata
     devices = context.loop_client.device_metadata()
-    recorder.event(20, "link", devices.get("link", ""))
     friction = _friction_lines(devices)
-    for line in friction:
-        recorder.event(30, "friction", line)
-    recorder.event(20, "stop", outcome.reason)
+
+    def write_events() -> None:
+        recorder.event(20, "link", devices.get("link", ""))
+        for line in friction:
+            recorder.event(30, "friction", line)
+        recorder.event(20, "stop", outcome.reason)
+
+    context.console_loop.run_in_background(write_events)
     try:
         verified = context.console_loop.run_in_background(
             lambda: archive.seal(header, name, outcome.reason)
