@@ -31,6 +31,7 @@ _START = (
 )
 _RAISED = re.compile(r"[A-Za-z_][\w.]*(Error|Exception|Interrupt)\b")
 _STDERR_CHARACTERS = 4000  # characters kept of a child's standard error
+ANSWER_S = 20.0  # s; a process that is silent for longer waits for a broken device
 _PATIENCE = 3.0  # s for a child to end before it is killed
 
 

@@ -10,7 +10,7 @@ from acquisition.clock import SystemClock
 from acquisition.control_loop.realtime import RealtimeRequest, request
 from acquisition.errors import TrialFileError
 from acquisition.ipc.channel import ChannelClosedError
-from acquisition.ipc.child import Child, ChildContext, name_process
+from acquisition.ipc.child import ANSWER_S, Child, ChildContext, name_process
 from acquisition.ipc.heap import trim_heap
 from acquisition.ipc.layout import SharedLayout
 from acquisition.ipc.requests import Dispatcher, Handlers, Request
@@ -20,7 +20,6 @@ from acquisition.trial_file.verify import VerifiedFile
 
 DRAIN_S = 0.02
 NICE = 5
-ANSWER_S = 20.0  # s; a recorder that is silent for longer waits for a broken disk
 
 
 @dataclass(frozen=True, slots=True)

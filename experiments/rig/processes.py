@@ -8,7 +8,7 @@ from acquisition.control_loop.realtime import GrantResult, choose_cores
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
 from acquisition.errors import LinkError, PreflightError, TractionError
-from acquisition.ipc.child import Child, ProcessLostError
+from acquisition.ipc.child import ANSWER_S, Child, ProcessLostError
 from acquisition.ipc.layout import SharedLayout
 from acquisition.ipc.loop_client import LoopClient
 from acquisition.ipc.requests import Answer, Request
@@ -125,7 +125,7 @@ class MultiProcessBackend:
 
         Empty for a sensor on the arm's bus, whose process is busy with the loop.
         """
-        return {} if self._reader is None else self._reader.ask(AskStream())
+        return {} if self._reader is None else self._reader.ask(AskStream(), ANSWER_S)
 
     def begin(self) -> None:
         """Start the loop."""

@@ -401,9 +401,11 @@ class ConsoleLoop:
         command.
         """
         backend = self.rig.backend
-        with suppress(ProcessLostError):  # reported already
+        is_confirmed = backend.idle()  # first: a recorder may not answer
+        try:
             backend.recorder.abandon()
-        is_confirmed = backend.idle()
+        except ProcessLostError as lost:
+            self.console.problem(str(lost))
         if not self.loop_client.loop.is_running:
             return is_confirmed
         with suppress(TractionError):

@@ -18,7 +18,6 @@ from experiments.session.summaries import (
     facts_of,
     recorded_facts,
     summarise,
-    summarise_unverified,
 )
 from experiments.session.where import Where
 
@@ -43,18 +42,12 @@ def summarise_sessions(
         where: checksums are computed only for sessions with these values.
         digest: the checksums computed so far.
     """
-    folders = list_sessions(data)
-    asked = [folder for folder in folders if where.matches(facts_of(folder))]
-    _compute_checksums(asked, digest)
+    folders = [(f, where.matches(facts_of(f))) for f in list_sessions(data)]
+    _compute_checksums([folder for folder, is_asked in folders if is_asked], digest)
     return _counted_once(
         [
-            SessionEntry(
-                folder,
-                summarise(folder, digest)
-                if folder in asked
-                else summarise_unverified(folder),
-            )
-            for folder in folders
+            SessionEntry(folder, summarise(folder, digest if is_asked else None))
+            for folder, is_asked in folders
         ]
     )
 

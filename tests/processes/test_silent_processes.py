@@ -149,15 +149,21 @@ def test_the_arm_does_not_exceed_its_speed_whatever_stalls(tmp_path, victim, sec
             assert (speeds < FASTEST).all()
 
 
-def test_a_recorder_that_never_answers_again_ends_the_session(tmp_path):
-    """As one that waits for a broken disk: the arm holds, then goes idle."""
+@pytest.mark.parametrize(
+    ("victim", "fault"),
+    [
+        ("recorder", "o heartbeat from the recorder"),
+        ("sensor reader", "F/T sample"),
+    ],
+)
+def test_a_process_that_never_answers_again_ends_the_session(tmp_path, victim, fault):
+    """As one that waits for a broken device: the arm holds, then goes idle."""
     with running_trial(tmp_path) as seen:
-        os.kill(seen.pids["recorder"], signal.SIGSTOP)
+        os.kill(seen.pids[victim], signal.SIGSTOP)
         assert until(lambda: holds(seen), LIMIT + REACTION)
-        message = "o heartbeat from the recorder"
-        assert until(lambda: message in seen.output(), 5) is not None, seen.output()
-        assert until(lambda: not is_running(seen.process.pid), 60), seen.output()
+        assert until(lambda: fault in seen.output(), 5) is not None, seen.output()
+        assert until(lambda: not is_running(seen.process.pid), 90), seen.output()
         assert seen.process.wait(1) == 4
-        assert "recorder process ended: killed after 20 s" in seen.output()
+        assert f"{victim} process ended: killed after 20 s" in seen.output()
         assert "ARM: idle; it sinks slowly, support it." in seen.output()
         assert "Traceback" not in seen.output()
