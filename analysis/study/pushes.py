@@ -125,7 +125,7 @@ def find_pushes(trial: PreparedTrial, v_slip: float = V_SLIP) -> tuple[FootPush,
     pushes = [_push(smooth, row, is_held=False) for row in peaks]
     pushes += [
         _push(smooth, row, is_held=True)
-        for row in _maxima(smooth.F_t)
+        for row in prominent_maxima(smooth.F_t)
         if _is_held(smooth, row, slips)
     ]
     usable = (push for push in pushes if push.peak >= _LEAST_PEAK)
@@ -165,13 +165,29 @@ def _slip_peaks(smooth: Smoothed, slips: Sequence[tuple[int, int]]) -> list[int]
     return rows
 
 
-def _maxima(F_t: Array) -> list[int]:
-    """Return the rows of the prominent local maxima."""
-    from scipy.signal import find_peaks
+def prominent_maxima(F_t: Array) -> list[int]:
+    """Return the rows of the prominent local maxima of F_t [N], shape (n,).
 
-    rows, shape = find_peaks(F_t, prominence=_PROMINENCE)
-    is_prominent = shape["prominences"] >= _PROMINENCE_SHARE * F_t[rows]
-    return [int(row) for row in rows[is_prominent]]
+    Of a maximum of several equal rows, the first.
+    """
+    is_top = (F_t[1:-1] > F_t[:-2]) & (F_t[1:-1] >= F_t[2:])
+    return [
+        int(row)
+        for row in np.flatnonzero(is_top) + 1
+        if _prominence(F_t, row) >= max(_PROMINENCE, _PROMINENCE_SHARE * F_t[row])
+    ]
+
+
+def _prominence(F_t: Array, row: int) -> float:
+    """Return the height of a maximum above the higher of the valleys beside it.
+
+    As in topography: a valley reaches to the next higher force, or to the end.
+    """
+    peak, higher = F_t[row], np.flatnonzero(F_t > F_t[row])
+    k = int(np.searchsorted(higher, row))
+    first = higher[k - 1] + 1 if k else 0
+    end = higher[k] if k < higher.size else F_t.size
+    return float(peak - max(F_t[first : row + 1].min(), F_t[row:end].min()))
 
 
 def _is_held(smooth: Smoothed, row: int, slips: Sequence[tuple[int, int]]) -> bool:

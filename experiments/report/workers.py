@@ -8,7 +8,6 @@ from analysis.study.worker_processes import end_workers, warm_workers
 _NEEDED = (  # modules of fits and figures, in order of use
     "analysis.study.study",
     "analysis.report.page",
-    "scipy.signal",
     "matplotlib.figure",
     "matplotlib.backends.backend_agg",
     "matplotlib.backends.backend_svg",

@@ -3,7 +3,13 @@ import pytest
 
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import TractionSeries
-from analysis.study.pushes import V_SLIP, FootPush, PushTable, find_pushes
+from analysis.study.pushes import (
+    V_SLIP,
+    FootPush,
+    PushTable,
+    find_pushes,
+    prominent_maxima,
+)
 from tests.analysis.study.pushed import DT, RUNNING, one_push
 
 
@@ -54,6 +60,18 @@ def test_a_maximum_needs_a_relative_prominence(depth, count):
     F_t = np.interp(np.arange(1000), [0, 300, 500, 700, 999], [0, 10, 10, 10.1, 0])
     F_t[300:701] = np.interp(np.arange(401), [0, 200, 400], [10, 10 - depth, 10.1])
     assert len(find_pushes(trial(F_t, np.full(1000, 0.01)))) == count
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_prominence_is_that_of_scipy(seed):
+    from scipy.signal import find_peaks
+
+    rough = np.random.default_rng(seed).normal(size=2000)
+    F_t = 5.0 + np.convolve(rough.cumsum(), np.ones(9) / 9.0)
+    rows, shape = find_peaks(F_t, prominence=1.5)
+    expected = rows[shape["prominences"] >= 0.2 * F_t[rows]].tolist()
+    assert len(expected) > 3
+    assert prominent_maxima(F_t) == expected
 
 
 def test_the_spike_of_resticking_is_not_a_push():
