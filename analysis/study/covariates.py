@@ -24,6 +24,7 @@ from analysis.data.samples import SampleTable, TrainingSet
 from analysis.data.series import Array, Indices
 from analysis.data.terrain_kinds import FLAT
 from analysis.gp.kernels import SquaredExponential
+from analysis.gp.regression import fit_gp
 from analysis.study.crossval import fold_groups
 from analysis.study.models import FitOptions
 from analysis.study.new_trial import NewTrialFit
@@ -231,7 +232,8 @@ def _densities(task: CovariateTask, column: int | None) -> list[float]:
     chosen = np.random.default_rng(key).choice(joined.count, count, replace=False)
     training = TrainingSet(joined, tuple(rows.count for rows in fitted), chosen)
     kernel = SquaredExponential(joined.inputs.shape[1])
-    model = NewTrialFit(training, None).fit(kernel)
+    start = fit_gp(training.subset.inputs, training.subset.F_t, kernel)
+    model = NewTrialFit(training, None).fit(start)
     return [
         float(
             model.predict(rows.F_n, rows.v_t, rows.further).log_density(rows.F_t).mean()

@@ -188,7 +188,7 @@ class ModelFitter:
     def __init__(self, training: TrainingSet, options: FitOptions) -> None:
         self.training, self.options = training, options
         self._curve: TustinFit | None = None
-        self._processes: dict[Kernel, GpModel] = {}
+        self._processes: dict[tuple[Kernel, bool], GpModel] = {}
 
     def curve(self) -> TustinFit:
         """Return the Tustin fit to all training rows; computed once.
@@ -216,22 +216,24 @@ class ModelFitter:
             )
         return MODELS[name].fit(self)
 
-    def gp(self, kernel: Kernel) -> GpModel:
-        """Fit a Gaussian process with constant noise to the chosen rows."""
-        if kernel not in self._processes:
-            subset = self.training.subset
-            self._processes[kernel] = GpModel(fit_gp(subset.inputs, subset.F_t, kernel))
-        return self._processes[kernel]
+    def gp(self, kernel: Kernel, *, is_around_tustin: bool = False) -> GpModel:
+        """Fit a Gaussian process with constant noise to the chosen rows; once each.
 
-    def gp_around_tustin(self, kernel: Kernel) -> GpModel:
-        """Fit a Tustin curve and a zero-mean process to its residuals.
-
-        The curve is fitted to all rows, the process to the chosen ones.
+        Args:
+            kernel: covariance function.
+            is_around_tustin: the mean function is the Tustin curve, fitted to all rows,
+                instead of a constant.
         """
-        curve, subset = self.curve(), self.training.subset
-        residual = subset.F_t - curve.mean(subset.F_n, subset.v_t)
-        process = fit_gp(subset.inputs, residual, kernel, is_centred=False)
-        return GpModel(process, curve)
+        key = kernel, is_around_tustin
+        if key not in self._processes:
+            subset = self.training.subset
+            curve = self.curve() if is_around_tustin else None
+            outputs = subset.F_t
+            if curve is not None:
+                outputs = outputs - curve.mean(subset.F_n, subset.v_t)
+            process = fit_gp(subset.inputs, outputs, kernel, is_centred=curve is None)
+            self._processes[key] = GpModel(process, curve)
+        return self._processes[key]
 
     def gp_with_chosen_noise(self) -> GpModel:
         """Fit a Gaussian process whose noise model is chosen by the training trials."""
@@ -252,8 +254,8 @@ class ModelFitter:
         self, kernel: Kernel, *, is_around_tustin: bool = False
     ) -> NewTrialModel:
         """Fit the model of a new trial with a Tustin or constant mean function."""
-        curve = self.curve() if is_around_tustin else None
-        return NewTrialFit(self.training, curve).fit(kernel)
+        start = self.gp(kernel, is_around_tustin=is_around_tustin)
+        return NewTrialFit(self.training, start.curve).fit(start.process)
 
     @property
     def se_kernel(self) -> SquaredExponential:
@@ -296,10 +298,11 @@ MODELS: Mapping[str, ModelKind] = {
     GP_NN: ModelKind("GP (NN)", lambda fitter: fitter.gp(fitter.nn_kernel)),
     GP_SE_TUSTIN: ModelKind(
         "GP (SE, Tustin mean)",
-        lambda fitter: fitter.gp_around_tustin(fitter.se_kernel),
+        lambda fitter: fitter.gp(fitter.se_kernel, is_around_tustin=True),
     ),
     GP_NN_TUSTIN: ModelKind(
-        "GP (NN, Tustin mean)", lambda fitter: fitter.gp_around_tustin(fitter.nn_kernel)
+        "GP (NN, Tustin mean)",
+        lambda fitter: fitter.gp(fitter.nn_kernel, is_around_tustin=True),
     ),
     GP_SE_NOISE: ModelKind(
         "GP (SE, noise chosen)", ModelFitter.gp_with_chosen_noise, is_compared=False

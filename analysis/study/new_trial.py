@@ -16,10 +16,9 @@ import numpy as np
 
 from analysis.data.samples import TrainingSet
 from analysis.data.series import Array, Indices
-from analysis.gp.kernels import Kernel
-from analysis.gp.noise import ConstantNoise, LogLinearNoise
+from analysis.gp.noise import LogLinearNoise, Noise
 from analysis.gp.refit import refit_gp
-from analysis.gp.regression import GaussianProcess, LeaveOut, fit_gp
+from analysis.gp.regression import GaussianProcess, LeaveOut
 from analysis.gp.trial_noise import TrialNoise, TrialRows
 from analysis.study.distribution import (
     NewTrialPrediction,
@@ -105,31 +104,24 @@ class NewTrialFit:
         self._trials = TrialRows(label)
         self._left_out = [np.flatnonzero(trial == k)[::_THIN] for k in np.unique(label)]
 
-    def fit(self, kernel: Kernel) -> NewTrialModel:
-        """Fit the model with this kernel.
+    def fit(self, start: GaussianProcess) -> NewTrialModel:
+        """Fit the model with the kernel of `start`.
 
-        Raises:
-            SettingsError: fewer than 20 rows, or outputs that do not vary.
+        Args:
+            start: process with constant noise and the same mean function, fitted to the
+                chosen rows; the search starts from its optima.
         """
-        process = self._process(kernel)
+        process = self._process(start)
         residuals = residual_quantiles(self._held_out(process))
         return NewTrialModel(process, self._curve, len(self._left_out), residuals)
 
-    def _process(self, kernel: Kernel) -> GaussianProcess:
-        """Fit the process to the chosen rows, with input-dependent noise."""
-        outputs = self._outputs(self._chosen)
-        constant, changing = ConstantNoise(), LogLinearNoise(self._rows.inputs.shape[1])
-        has_level = len(self._left_out) > 1
-        begin = fit_gp(
-            self._rows.inputs,
-            outputs,
-            kernel,
-            TrialNoise(constant) if has_level else constant,
-            is_centred=self._curve is None,
-            trials=self._trials,
-        )
-        noise = TrialNoise(changing) if has_level else changing
-        return refit_gp(begin, outputs, noise=noise)
+    def _process(self, start: GaussianProcess) -> GaussianProcess:
+        """Fit the process to the spread rows, with levels and input-dependent noise."""
+        inputs, outputs = self._rows.inputs, self._outputs(self._chosen)
+        noise: Noise = LogLinearNoise(inputs.shape[1])
+        if len(self._left_out) > 1:
+            noise = TrialNoise(noise)
+        return refit_gp(start.given(inputs, outputs, self._trials), outputs, noise)
 
     def _held_out(self, process: GaussianProcess) -> list[Array]:
         """Return the standardised residuals of every held-out trial about its level.

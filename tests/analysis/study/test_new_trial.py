@@ -5,6 +5,7 @@ import pytest
 
 from analysis.data.samples import SampleTable, TrainingSet
 from analysis.gp.kernels import SquaredExponential
+from analysis.gp.regression import fit_gp
 from analysis.study.distribution import SHARES, normal_scores
 from analysis.study.metrics import coverage, log_density
 from analysis.study.models import (
@@ -53,8 +54,13 @@ def training(trials, chosen=CHOSEN, seed=1):
     return TrainingSet(rows, tuple(trial.count for trial in trials), take)
 
 
+def fitted(data):
+    start = fit_gp(data.subset.inputs, data.subset.F_t, SE)
+    return NewTrialFit(data, None).fit(start)
+
+
 def test_the_residuals_of_normal_noise_are_normal():
-    model = NewTrialFit(training(trials_of(normal, 8)), None).fit(SE)
+    model = fitted(training(trials_of(normal, 8)))
     inner = slice(1, -1)  # 190 rows show 1 % poorly
     assert model.residuals[inner] == pytest.approx(
         normal_scores(SHARES)[inner], abs=0.35
@@ -62,14 +68,14 @@ def test_the_residuals_of_normal_noise_are_normal():
 
 
 def test_the_residuals_of_skewed_noise_are_skewed():
-    model = NewTrialFit(training(trials_of(skewed, 8)), None).fit(SE)
+    model = fitted(training(trials_of(skewed, 8)))
     low, median, high = (model.residuals[SHARES.index(s)] for s in (0.05, 0.5, 0.95))
     # an exponential variable: 0.05, 0.69 and 3.0
     assert high - median > 2.0 * (median - low)
 
 
 def test_bands_widen_where_the_noise_grows():
-    model = NewTrialFit(training(trials_of(growing, 8)), None).fit(SE)
+    model = fitted(training(trials_of(growing, 8)))
     low, high = model.predict(np.array([1.5, 7.5]), np.array([0.1, 0.1])).quantiles(
         (0.05, 0.95)
     )
@@ -83,7 +89,7 @@ def test_bands_have_nominal_coverage_for_differing_trials(spread):
     shares = {0.5: [], 0.9: []}
     for seed in range(3, 9):
         trials = trials_of(spread, 9, between=1.0, seed=seed)
-        model = NewTrialFit(training(trials), None).fit(SE)
+        model = fitted(training(trials))
         for rows in trials_of(spread, 30, between=1.0, seed=100 + seed):
             made = model.predict(rows.F_n, rows.v_t)
             for share, found in shares.items():
@@ -124,7 +130,7 @@ def test_every_process_has_a_trial_effect(name, spread):
 
 
 def test_one_trial_gives_neither_levels_nor_residuals():
-    model = NewTrialFit(training(trials_of(skewed, 1), 60), None).fit(SE)
+    model = fitted(training(trials_of(skewed, 1), 60))
     assert model.level_sd == 0.0
     assert model.residuals == pytest.approx(normal_scores(SHARES))
 
@@ -132,7 +138,8 @@ def test_one_trial_gives_neither_levels_nor_residuals():
 def test_the_rows_of_a_trial_may_come_in_any_order():
     data = training(trials_of(normal, 5, between=0.5), 80)
     mixed = TrainingSet(data.rows, data.lengths, data.chosen[::-1])
-    first, second = (NewTrialFit(d, None).fit(SE) for d in (data, mixed))
+    start = fit_gp(data.subset.inputs, data.subset.F_t, SE)
+    first, second = (NewTrialFit(d, None).fit(start) for d in (data, mixed))
     assert first.process.lml == pytest.approx(second.process.lml, rel=1e-12)
 
 
@@ -142,7 +149,7 @@ def test_every_model_beyond_the_paper_has_a_fitter():
 
 def test_held_out_squares_are_split_into_residuals_and_levels():
     trials = trials_of(normal, 12, between=1.0, seed=8)
-    model = NewTrialFit(training(trials, 240), None).fit(SE)
+    model = fitted(training(trials, 240))
     means = [trial.F_t.mean() - 0.5 * trial.F_n.mean() for trial in trials]
     assert model.level_sd == pytest.approx(np.std(means, ddof=1), rel=0.2)
     # the residual around the levels is the noise of single rows
