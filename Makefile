@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 USED := $(VENV)/.used
 STAMP := $(VENV)/.installed
-PIP := PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check
+PIP := PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 
 DOCS := $(VENV)/.docs
 WHEEL := build/wheel
