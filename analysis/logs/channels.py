@@ -204,9 +204,9 @@ class _Rows:
             return
         self.stamps.append(stamp_ns)
         self.received.append(message.received_ns)
-        self.values.extend(row.tolist())
+        self.values.extend(row)
 
-    def row(self, message: LogMessage) -> tuple[int, Array, str]:
+    def row(self, message: LogMessage) -> tuple[int, Sequence[float], str]:
         """Return stamp, numbers and the reason why they are unusable ("" = none)."""
         raise NotImplementedError
 
@@ -293,7 +293,7 @@ class _JointRows(_Rows):
         self._order: list[int] = []
         self._without_velocity = 0
 
-    def row(self, message: LogMessage) -> tuple[int, Array, str]:
+    def row(self, message: LogMessage) -> tuple[int, Sequence[float], str]:
         joints = read_joints(message.data, self.topic.serialization)
         if joints.names != self._seen:
             index = {name: k for k, name in enumerate(joints.names)}
@@ -309,7 +309,7 @@ class _JointRows(_Rows):
                 joints.position,
                 "with different numbers of names and positions",
             )
-        row = joints.position[self._order]
+        row = [joints.position[k] for k in self._order]
         if not _is_measured(row):
             return stamp_ns, row, "with invalid positions"
         if len(joints.velocity) and not _is_measured(joints.velocity):
@@ -385,7 +385,7 @@ class _WrenchRows(_Rows):
         super().__init__(topic, 6)
         self._frame_id = ""
 
-    def row(self, message: LogMessage) -> tuple[int, Array, str]:
+    def row(self, message: LogMessage) -> tuple[int, Sequence[float], str]:
         header, wrench = read_wrench(message.data, self.topic.serialization)
         self._frame_id = self._frame_id or header.frame_id
         cause = "" if _is_measured(wrench) else "with invalid readings"
@@ -412,8 +412,8 @@ def _stuck_spans(times: Nanoseconds, wrench: Array) -> list[tuple[int, int]]:
     return [(int(times[first[k]]), int(times[last[k]])) for k in rows]
 
 
-def _is_measured(values: Array) -> bool:
-    return bool((np.abs(values) < _ABSURD).all())  # False for NaN
+def _is_measured(values: Sequence[float]) -> bool:
+    return all(-_ABSURD < value < _ABSURD for value in values)  # False for NaN
 
 
 def _share_distinct(times: Nanoseconds) -> float:

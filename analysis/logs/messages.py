@@ -8,10 +8,8 @@ its header begins with a counter.
 
 import struct
 from dataclasses import dataclass
+from typing import Any
 
-import numpy as np
-
-from analysis.data.series import Array
 from analysis.logs.log_file import LONGEST_NAME, Serialization
 
 JOINT_STATE = "sensor_msgs/JointState"
@@ -45,14 +43,14 @@ class JointMessage:
     Attributes:
         header: header.
         names: names of the joints.
-        position: positions [rad, m], shape (joints,); empty if the message has none.
-        velocity: velocities [rad/s, m/s], shape (joints,); empty if there are none.
+        position: positions [rad, m], one per joint; empty if the message has none.
+        velocity: velocities [rad/s, m/s], one per joint; empty if there are none.
     """
 
     header: Header
     names: tuple[str, ...]
-    position: Array
-    velocity: Array
+    position: tuple[float, ...]
+    velocity: tuple[float, ...]
 
 
 def read_header(data: bytes, serialization: Serialization) -> Header:
@@ -72,8 +70,10 @@ def read_joints(data: bytes, serialization: Serialization) -> JointMessage:
     return JointMessage(header, names, cursor.numbers(), cursor.numbers())
 
 
-def read_wrench(data: bytes, serialization: Serialization) -> tuple[Header, Array]:
-    """Decode a WrenchStamped: header, and force [N] and torque [N m], shape (6,).
+def read_wrench(
+    data: bytes, serialization: Serialization
+) -> tuple[Header, tuple[float, ...]]:
+    """Decode a WrenchStamped: header, and force [N] and torque [N m], six numbers.
 
     Raises:
         MessageError: the message is too short.
@@ -115,27 +115,22 @@ class _Cursor:
         self._at += size
         return text.rstrip(b"\0").decode(errors="replace")
 
-    def numbers(self) -> Array:
+    def numbers(self) -> tuple[float, ...]:
         count = self.count(8)
-        return self.doubles(count) if count else np.zeros(0)
+        return self.doubles(count) if count else ()
 
-    def doubles(self, count: int) -> Array:
-        self._align(8)
-        if count * 8 > len(self._data) - self._at:
-            raise MessageError("it is shorter than its type")
-        values = np.frombuffer(self._data, f"{self._order}f8", count, self._at)
-        self._at += 8 * count
-        return values.astype(np.float64)
+    def doubles(self, count: int) -> tuple[float, ...]:
+        return self._unpack(f"{self._order}{count}d", 8, 8 * count)
 
     def _integer(self) -> int:
-        self._align(4)
+        return self._unpack(f"{self._order}I", 4, 4)[0]
+
+    def _unpack(self, layout: str, alignment: int, size: int) -> tuple[Any, ...]:
+        if self._is_cdr:
+            self._at += -(self._at - 4) % alignment
         try:
-            (value,) = struct.unpack_from(f"{self._order}I", self._data, self._at)
+            values = struct.unpack_from(layout, self._data, self._at)
         except struct.error as error:
             raise MessageError("it is shorter than its type") from error
-        self._at += 4
-        return value
-
-    def _align(self, size: int) -> None:
-        if self._is_cdr:
-            self._at += -(self._at - 4) % size
+        self._at += size
+        return values

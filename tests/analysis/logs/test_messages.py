@@ -31,13 +31,13 @@ def test_messages_of_another_library_round_trip(release, serialization):
         if topic == "/joint_states":
             found = read_joints(data, serialization)
             assert list(found.names) == message.name
-            assert found.position.tolist() == message.position.tolist()
-            assert found.velocity.tolist() == message.velocity.tolist()
+            assert list(found.position) == message.position.tolist()
+            assert list(found.velocity) == message.velocity.tolist()
         else:
             force, torque = message.wrench.force, message.wrench.torque
             _, wrench = read_wrench(data, serialization)
             expected = [force.x, force.y, force.z, torque.x, torque.y, torque.z]
-            assert wrench.tolist() == expected
+            assert list(wrench) == expected
 
 
 @pytest.mark.parametrize(
@@ -66,4 +66,4 @@ def test_big_endian_is_read():
     values = np.arange(6.0)
     header, wrench = read_wrench(head + values.astype(">f8").tobytes(), "cdr")
     assert (header.stamp_ns, header.frame_id) == (7 * 10**9, "a")
-    assert wrench.tolist() == values.tolist()
+    assert list(wrench) == values.tolist()
