@@ -84,14 +84,14 @@ def _in_band(
     gram = basis @ basis.T
     if not (np.isfinite(gram).all() and np.linalg.cond(gram) < _SINGULAR):
         return ForceLag(0.0, 0.0)
-    inverse = np.linalg.inv(gram)
-    shares = np.empty(early + late + 1)
-    for k in range(shares.size):
-        shifted = force[k : k + basis.shape[1]]
-        products = basis @ shifted
-        variance = float(shifted @ shifted)
-        explained = float(products @ inverse @ products)
-        shares[k] = explained / variance if 0.0 < variance < np.inf else 0.0
+    products = np.stack([np.correlate(force, row, "valid") for row in basis])
+    explained = np.sum(products * (np.linalg.inv(gram) @ products), axis=0)
+    total = np.cumsum(np.concatenate([[0.0], force * force]))
+    variance = total[basis.shape[1] :] - total[: -basis.shape[1]]
+    is_usable = (variance > 0.0) & (variance < np.inf)
+    shares = np.divide(
+        explained, variance, out=np.zeros(early + late + 1), where=is_usable
+    )
     best = int(shares.argmax())
     if not _is_unique(shares, best, round(_RIVAL_DISTANCE * rate)):
         return ForceLag((best - early) / rate, 0.0)
