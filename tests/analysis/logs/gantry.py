@@ -66,8 +66,8 @@ class StrokeLog:
     slope: float = 0.0
     heading: float = 0.0
     noise: float = 0.03
-    joint_rate: float = 250.0
-    wrench_rate: float = 400.0
+    joint_rate: float = 125.0
+    wrench_rate: float = 200.0
     bias_drift: float = 0.0
     seed: int = 1
     axes: tuple = (0, 1, 2)  # recorded order of the sensor's axes

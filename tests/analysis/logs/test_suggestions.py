@@ -31,13 +31,13 @@ def jumping(rows):
 def stuck(rows):
     """The wrench of 6 s is repeated until 8 s."""
     times = [row for row in rows if row[0] == "/ft/wrench"]
-    for _, _, message in times[2400:3200]:
-        message.wrench.force.x = times[2400][2].wrench.force.x
-        message.wrench.force.y = times[2400][2].wrench.force.y
-        message.wrench.force.z = times[2400][2].wrench.force.z
-        message.wrench.torque.x = times[2400][2].wrench.torque.x
-        message.wrench.torque.y = times[2400][2].wrench.torque.y
-        message.wrench.torque.z = times[2400][2].wrench.torque.z
+    for _, _, message in times[1200:1600]:
+        message.wrench.force.x = times[1200][2].wrench.force.x
+        message.wrench.force.y = times[1200][2].wrench.force.y
+        message.wrench.force.z = times[1200][2].wrench.force.z
+        message.wrench.torque.x = times[1200][2].wrench.torque.x
+        message.wrench.torque.y = times[1200][2].wrench.torque.y
+        message.wrench.torque.z = times[1200][2].wrench.torque.z
     return rows
 
 
