@@ -8,6 +8,10 @@ from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
+import pytest
+
+pytestmark = pytest.mark.slow  # every module is parsed
+
 ROOT = Path(__file__).parents[1]
 PACKAGES = (
     "acquisition",

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow  # every module of tests is parsed
+
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("tests", "benchmarks")
 OURS = {

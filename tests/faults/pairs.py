@@ -214,6 +214,6 @@ def _attack(pair: Pair) -> Attack:
         f"{pair.delay_ms} ms later, {pair.phase}",
         "both are reported, the stricter reaction applies, no unpowered trial is kept",
         check,
-        RunBy.TEST if pair in EVERY_COMMIT else RunBy.NIGHTLY,
+        RunBy.CI if pair in EVERY_COMMIT else RunBy.NIGHTLY,
         seconds=240,
     )

@@ -8,7 +8,7 @@ from tests.faults.pairs import EVERY_COMMIT, every_pair, pair_attacks
 
 
 @pytest.mark.parametrize(
-    "row", parameters(r for r in pair_attacks() if r.run_by is RunBy.TEST)
+    "row", parameters(r for r in pair_attacks() if r.run_by is RunBy.CI)
 )
 def test_two_faults_have_the_stricter_outcome(row, tmp_path):
     row.check(tmp_path)

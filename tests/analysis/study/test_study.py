@@ -96,6 +96,7 @@ def test_csv_keeps_a_terrain_from_becoming_a_formula(make_series, moving):
     assert {row["terrain"] for row in table} == {"'=1+1"}
 
 
+@pytest.mark.slow
 def test_results_are_identical_bit_by_bit_for_two_workers(small_study, slice_trials):
     options = StudyOptions(fit=SMALL_FIT, n_jobs=2)
     parallel = run_study(slice_trials, options, simulated=True)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from fakes.ground.terrain import GroundChoice, make_terrain
+from tests.sweeps import swept
 
 DT = 0.0005
 LIFTED, PRESS = 0.001, 4.0  # m, N
@@ -66,7 +67,9 @@ PATHS = {
 
 
 @pytest.mark.parametrize("path", sorted(PATHS))
-@pytest.mark.parametrize(("stones", "foot"), GROUNDS)
+@pytest.mark.parametrize(
+    ("stones", "foot"), swept(GROUNDS, {("small", "tread"), ("none", "bare")})
+)
 def test_contact_creates_no_energy_over_a_closed_path(stones, foot, path):
     for seed in range(3):
         down_and_up = closed_path(make_ground(stones, foot, seed), HOME)

@@ -7,6 +7,7 @@ from acquisition.control_loop.faults import Fault
 from acquisition.control_loop.loop import Loop
 from acquisition.control_loop.states import ArmState
 from tests.fakes.world.holding import SPEED, HoldBench
+from tests.sweeps import swept
 
 MS = 1_000_000
 LIMIT_MS = 250.0  # of lasting lateness until the arm is idle
@@ -46,9 +47,9 @@ def late_arm(state, friction, late_ms, twist=0.0, seconds=1.0):
     return worst, faults, idle_ms
 
 
-@pytest.mark.parametrize("late_ms", [2.0, 6.6, 12.6, 18.6, 50.0])
+@pytest.mark.parametrize("late_ms", swept([2.0, 6.6, 12.6, 18.6, 50.0], {2.0, 12.6}))
 @pytest.mark.parametrize("state", [ArmState.FLOAT, ArmState.HOLD])
-@pytest.mark.parametrize("friction", [0.02, pytest.param(0.4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("friction", swept([0.02, 0.4], {0.02}))
 def test_lasting_lateness_idles_the_arm_while_slow(friction, state, late_ms):
     worst, faults, idle_ms = late_arm(state, friction, late_ms)
     assert worst <= 1.0

@@ -7,6 +7,7 @@ from acquisition.devices import SafetyMode
 from acquisition.errors import DeviceFaultError
 from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
+from tests.sweeps import swept
 from wam.bus.frames import MOTOR_NODES
 from wam.bus.property_client import PropertyClient
 from wam.driver.arm import WamArm
@@ -168,7 +169,7 @@ def test_every_safety_firmware_accepts_limits_and_reports_its_cause(vers):
     assert bench.arm.safety_faults() == ("torque",)
 
 
-@pytest.mark.parametrize("vers", RANGE_ENDS)
+@pytest.mark.parametrize("vers", swept(RANGE_ENDS, {40, 61, 200}))
 def test_every_firmware_is_polled_for_telemetry(vers):
     bench = Bench(vers, vers)
     bench.arm.start()
