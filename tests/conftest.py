@@ -22,10 +22,11 @@ if TYPE_CHECKING:
 
 DATA = Path(__file__).parent / "data"
 # A stalled machine must not fail a test: the time of an example is not tested.
-settings.register_profile(
-    "untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow]
-)
-settings.load_profile("untimed")
+# The examples are the same for every commit; those of a night are drawn anew.
+_UNTIMED = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
+settings.register_profile("commit", derandomize=True, max_examples=50, **_UNTIMED)
+settings.register_profile("nightly", max_examples=2000, **_UNTIMED)
+settings.load_profile("commit")
 
 
 def pytest_configure(config: pytest.Config) -> None:
