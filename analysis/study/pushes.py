@@ -168,26 +168,28 @@ def _slip_peaks(smooth: Smoothed, slips: Sequence[tuple[int, int]]) -> list[int]
 def prominent_maxima(F_t: Array) -> list[int]:
     """Return the rows of the prominent local maxima of F_t [N], shape (n,).
 
-    Of a maximum of several equal rows, the first.
+    The prominence is the height above the higher of the valleys on both sides, each of
+    which ends at the next higher force. Of a maximum of several equal rows, the first.
     """
-    is_top = (F_t[1:-1] > F_t[:-2]) & (F_t[1:-1] >= F_t[2:])
-    return [
-        int(row)
-        for row in np.flatnonzero(is_top) + 1
-        if _prominence(F_t, row) >= max(_PROMINENCE, _PROMINENCE_SHARE * F_t[row])
-    ]
+    forces: list[float] = F_t.tolist()
+    prominence = np.minimum(_depths(forces), _depths(forces[::-1])[::-1])[1:-1]
+    inner = F_t[1:-1]
+    is_top = (inner > F_t[:-2]) & (inner >= F_t[2:])
+    is_top &= prominence >= np.maximum(_PROMINENCE, _PROMINENCE_SHARE * inner)
+    return (np.flatnonzero(is_top) + 1).tolist()
 
 
-def _prominence(F_t: Array, row: int) -> float:
-    """Return the height of a maximum above the higher of the valleys beside it.
-
-    As in topography: a valley reaches to the next higher force, or to the end.
-    """
-    peak, higher = F_t[row], np.flatnonzero(F_t > F_t[row])
-    k = int(np.searchsorted(higher, row))
-    first = higher[k - 1] + 1 if k else 0
-    end = higher[k] if k < higher.size else F_t.size
-    return float(peak - max(F_t[first : row + 1].min(), F_t[row:end].min()))
+def _depths(forces: Sequence[float]) -> list[float]:
+    """Return the height of every row above the valley since the last higher force."""
+    depths: list[float] = []
+    higher: list[tuple[float, float]] = []  # falling forces, each with its valley
+    for force in forces:
+        lowest = force
+        while higher and higher[-1][0] <= force:
+            lowest = min(lowest, higher.pop()[1])
+        higher.append((force, lowest))
+        depths.append(force - lowest)
+    return depths
 
 
 def _is_held(smooth: Smoothed, row: int, slips: Sequence[tuple[int, int]]) -> bool:
