@@ -10,8 +10,9 @@ one with much. A single climb misses the best one in about every fourth fit. The
 climb starts at the best of the kernel's starting points by the likelihood of a part of
 the rows. From the best optimum so far, the search then moves to where another one may
 be and climbs again, a few times: it takes the likeliest of the kernel's moves by the
-likelihood of all rows, because the noise is known by then. A climb that approaches a
-known optimum is stopped.
+likelihood of all rows, because the noise is known by then; a part of the rows selects
+those that are worth it. A climb that approaches a
+known optimum is stopped, and so is one that gains little and lies below the best.
 """
 
 from collections.abc import Sequence
@@ -29,11 +30,16 @@ from analysis.gp.proposals import bounds, initial_points, moves
 from analysis.gp.trial_noise import TrialRows
 
 _DESIGN_ROWS = 150  # rows used to choose the first start
+_MOVE_ROWS = 100  # rows used to choose the moves that are rated by all rows
+_RATED = 4  # moves of a kind that are rated by all rows
 _SAME_OPTIMUM = (0.2, 0.1)  # in theta and likelihood: a climb this near is stopped
 _LEAST_MOVE = 1.0  # in theta: a shorter move leads back to the known optimum
 _PROBE = 0.3  # in theta: distance at which a close second optimum is probed
 _BARELY = 0.1  # log likelihood that may be lost between the two
 _PROMISING = 5.0  # log likelihood that a move may be below the optimum it starts from
+# a climb is hopeless that gains less than this share of its shortfall in these steps
+_STEPS, _GAIN = 3, 0.3
+_SHORTFALL = 0.5  # log likelihood that a climb may be below the best in any case
 _NEIGHBOURS = 0.5  # in theta: of two optima nearer than this, one start suffices
 _LOSING = 5.0  # log likelihood below the best at which an optimum cannot win any more
 _UNUSED = 4.0  # logarithm of a length or bias beyond which it makes no difference
@@ -45,7 +51,8 @@ class Start(NamedTuple):
     """Result of one start of a search.
 
     Attributes:
-        theta: final hyperparameters: an optimum, or close to one already known.
+        theta: final hyperparameters: an optimum, close to one already known, or where a
+            climb far below the best was stopped.
         lml: log marginal likelihood there, priors included.
         evaluations: number of likelihood evaluations.
     """
@@ -121,6 +128,7 @@ class Search:
     def __init__(self, likelihood: Likelihood) -> None:
         self._kernel, self._noise = likelihood.kernel, likelihood.noise
         self._likelihood, self._posterior = likelihood, Posterior(likelihood)
+        self._rough = Posterior(likelihood.thinned(_MOVE_ROWS))
         self._sd_y, sd_x = float(np.std(likelihood.r)), spread(likelihood.X)
         self._design = [
             np.concatenate([point, self._noise.start(self._sd_y)])
@@ -140,27 +148,40 @@ class Search:
         return max(self._design, key=rough.value)
 
     def climb(self, start: Array) -> None:
-        """Climb from a start to its optimum, or until close to a known one."""
+        """Climb from a start to its optimum, or until it is known or hopeless."""
+        values: list[float] = []
+
+        def is_over(theta: Array, value: float) -> bool:
+            values.append(value)
+            is_worse = bool(self._reached) and is_hopeless(values, self._best.value)
+            return is_worse or self._is_known(theta, value)
+
         self._began.append(start)
         reached = climb(
-            self._posterior, start, self._bounds, self._is_known, scale=self._scale
+            self._posterior, start, self._bounds, is_over, scale=self._scale
         )
         self._reached.append(reached)
 
     def move(self) -> None:
         """Climb from the likeliest move of every kind, each from the best optimum.
 
-        The kernel's starting points are the last kind. Moves are rated by the
-        likelihood of all rows with the noise of that optimum. Moves that end near a
-        known optimum are skipped, and so is a kind whose best move is too unlikely.
+        The kernel's starting points are the last kind. The likeliest moves by a part of
+        the rows are rated by all rows, with the noise of that optimum. Moves that end
+        near a known optimum are skipped, and so is a kind whose best move is too
+        unlikely.
         """
         for kind in range(len(self._moves_of(self._best.theta))):
             best = self._best
             visited = [*self._began, *(optimum.theta for optimum in self._reached)]
+            new = [
+                theta
+                for theta in self._moves_of(best.theta)[kind]
+                if _distance(self._kernel, theta, visited) >= _LEAST_MOVE
+            ]
+            new.sort(key=self._rough.value, reverse=True)
             rated = [
                 (self._posterior.value(theta), k, theta)
-                for k, theta in enumerate(self._moves_of(best.theta)[kind])
-                if _distance(self._kernel, theta, visited) >= _LEAST_MOVE
+                for k, theta in enumerate(new[:_RATED])
             ]
             if rated and max(rated)[0] > best.value - _PROMISING:
                 self.climb(max(rated)[2])
@@ -275,6 +296,19 @@ def distinct_optima(kernel: Kernel, reached: Sequence[Start]) -> list[Array]:
         if not optima or _distance(kernel, theta, optima) >= _NEIGHBOURS:
             optima.append(theta)
     return optima
+
+
+def is_hopeless(values: Sequence[float], best: float) -> bool:
+    """Whether a climb gains too little to reach the best optimum.
+
+    Args:
+        values: log likelihood after every step of the climb.
+        best: log likelihood of the best optimum.
+    """
+    if len(values) <= _STEPS:
+        return False
+    shortfall, gain = best - values[-1], values[-1] - values[-1 - _STEPS]
+    return shortfall > _SHORTFALL and gain < _GAIN * shortfall
 
 
 def spread(X: Array) -> Array:

@@ -6,7 +6,13 @@ from analysis.gp.arcsine import Arcsine
 from analysis.gp.kernels import SquaredExponential
 from analysis.gp.noise import ConstantNoise, LogLinearNoise
 from analysis.gp.proposals import bounds, moves
-from analysis.gp.search import Search, climb_from, maximise_posterior, posterior_search
+from analysis.gp.search import (
+    Search,
+    climb_from,
+    is_hopeless,
+    maximise_posterior,
+    posterior_search,
+)
 
 SE = SquaredExponential(2)
 ROWS = np.random.default_rng(0).normal(size=(40, 2))
@@ -106,6 +112,31 @@ def test_a_climb_near_a_known_optimum_is_abandoned():
     assert both.lml == alone[0].lml
     assert 5.0 - both.starts[1].lml < 0.2
     assert both.starts[1].evaluations < alone[1].starts[0].evaluations
+
+
+def test_a_climb_to_a_much_lower_optimum_is_abandoned():
+    best, low = np.array([0.0, -2.0, 0.5, -0.5]), np.array([0.0, 2.0, 0.5, -0.5])
+    hills = Hills((best, 9.0, 0.8), (low, 4.0, 1.0))
+    alone = climb_from(hills, [low + 0.7])
+    both = climb_from(hills, [best + 0.1, low + 0.7])
+    assert both.lml == pytest.approx(9.0, abs=0.1)
+    assert both.starts[1].lml < alone.lml
+    assert both.starts[1].evaluations < alone.starts[0].evaluations
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ((-9.0, -9.0, -9.0), False),  # too few steps
+        ((-9.0, -9.0, -9.0, -9.0), True),
+        ((-9.0, -8.0, -5.0, -4.0), False),  # gains more than it lacks
+        ((-9.0, -9.0, -4.2, -4.1, -4.0, -4.0), True),  # gained before
+        ((-0.4, -0.4, -0.4, -0.4), False),  # near the best
+        ((0.0, 1.0, 1.0, 1.0), False),  # above the best
+    ],
+)
+def test_a_climb_is_hopeless_far_below_the_best_without_gain(values, expected):
+    assert is_hopeless(values, 0.0) is expected
 
 
 def test_points_without_a_likelihood_are_not_starts():
