@@ -698,6 +698,17 @@ def test_a_start_overtaken_by_a_verdict_sends_no_torque(bench):
     assert (bench.state, bench.reason) == (ArmState.IDLE, "arm-not-active")
 
 
+@pytest.mark.parametrize("state", sorted(TORQUE))
+def test_a_start_that_is_withdrawn_permits_no_later_torque(bench, state):
+    bench.arm.mode = SafetyMode.IDLE
+    bench.run()
+    bench.cycle.start()
+    bench.run()
+    bench.enter(ArmState.IDLE)
+    bench.enter(state)
+    assert (bench.state, bench.reason) == (ArmState.IDLE, "arm-not-active")
+
+
 def test_an_idling_verdict_stays_latched_after_a_later_one():
     status = ControlStatus()
     status.latch(replace(fault("console-silent"), action=Action.IDLE))

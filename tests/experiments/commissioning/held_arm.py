@@ -33,12 +33,7 @@ class HeldArm:
     """An arm that deviates from its drawings, in the hands of a person."""
 
     def __init__(
-        self,
-        tool: Tool,
-        seed: int,
-        wrong: str = "",
-        another_day: int = 0,
-        tilt: tuple[float, float] = (0.0, 0.0),
+        self, tool: Tool, seed: int, wrong: str = "", another_day: int = 0
     ) -> None:
         """Draw the sound arm of `seed`.
 
@@ -48,10 +43,8 @@ class HeldArm:
             wrong: name in the catalogue of wrong rigs; "" for a sound arm.
             another_day: seed of what differs every day: poses, the sensor's bias,
                 drift and noise.
-            tilt: further rotation of the base about x and y [rad].
         """
-        tilted = RigDeviation(mount=np.array([*tilt, 0.0]))
-        sound = tilted.on(draw_sound_rig(seed))
+        sound = draw_sound_rig(seed)
         self.deviation: RigDeviation = (
             wrong_rig(wrong).deviation.on(sound) if wrong else sound
         )
