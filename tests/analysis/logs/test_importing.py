@@ -12,6 +12,8 @@ from tests.analysis.logs.gantry import StrokeLog, import_request, write_bag2, wr
 
 TURNED = StrokeLog(turn=1.0)
 
+FAST = {"joint_rate": 250.0, "wrench_rate": 400.0}  # Hz
+
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
@@ -69,7 +71,7 @@ def is_right(trial, stroke_log):
 @pytest.mark.slow
 def test_velocity_and_forces_agree_with_the_truth(imported):
     stroke_log = StrokeLog(
-        strokes=2, turn=1.0, tilt=0.3, slope=0.1, heading=0.7, lost=0.003
+        strokes=2, turn=1.0, tilt=0.3, slope=0.1, heading=0.7, lost=0.003, **FAST
     )
     found = imported(stroke_log)
     assert [trial.name for trial in found.trials] == ["T01", "T02"]
@@ -179,7 +181,7 @@ def test_forces_of_the_opposite_sign_are_refused_with_the_remedy(imported):
 
 @pytest.mark.slow
 def test_a_reaction_force_sensor_is_read_with_the_matching_option(imported):
-    stroke_log = StrokeLog(sign=-1.0)
+    stroke_log = StrokeLog(sign=-1.0, **FAST)
     assert is_right(imported(stroke_log, acts="foot-on-ground").trials[0], stroke_log)
 
 
@@ -200,7 +202,7 @@ def test_a_missing_weight_is_reported_with_its_effect(imported):
 
 @pytest.mark.slow
 def test_a_tare_may_be_six_numbers(imported):
-    stroke_log = StrokeLog()
+    stroke_log = StrokeLog(**FAST)
     found = imported(stroke_log, tare=np.array(stroke_log.bias))
     assert is_right(found.trials[0], stroke_log)
 
