@@ -4,6 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 USED := $(VENV)/.used
 STAMP := $(VENV)/.installed
+# Modules are compiled when they are first imported: most never are.
 PIP := PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 
 DOCS := $(VENV)/.docs

@@ -86,8 +86,8 @@ def _in_band(
         return ForceLag(0.0, 0.0)
     products = np.stack([np.correlate(force, row, "valid") for row in basis])
     explained = np.sum(products * (np.linalg.inv(gram) @ products), axis=0)
-    total = np.cumsum(np.concatenate([[0.0], force * force]))
-    variance = total[basis.shape[1] :] - total[: -basis.shape[1]]
+    # Summed anew at every offset: a difference of running sums could lose all digits.
+    variance = np.correlate(force * force, np.ones(basis.shape[1]), "valid")
     is_usable = (variance > 0.0) & (variance < np.inf)
     shares = np.divide(
         explained, variance, out=np.zeros(early + late + 1), where=is_usable

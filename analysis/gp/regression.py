@@ -230,7 +230,7 @@ def fit_gp(
     Raises:
         SettingsError: fewer than 20 rows, or outputs that do not vary.
     """
-    _check_outputs(y)
+    check_outputs(y)
     kernel = kernel or SquaredExponential(inputs.shape[1])
     noise = noise or ConstantNoise()
     centre, scale = inputs.mean(axis=0), spread(inputs)
@@ -255,7 +255,7 @@ def fit_gp(
     )
 
 
-def _check_outputs(y: Array) -> None:
+def check_outputs(y: Array) -> None:
     """Raise SettingsError if `y` has fewer than 20 rows or does not vary."""
     if y.size < MINIMUM_ROWS or np.ptp(y) == 0:
         span = float(np.ptp(y)) if y.size else 0.0

@@ -10,9 +10,9 @@ one with much. A single climb misses the best one in about every fourth fit. The
 climb starts at the best of the kernel's starting points by the likelihood of a part of
 the rows. From the best optimum so far, the search then moves to where another one may
 be and climbs again, a few times: it takes the likeliest of the kernel's moves by the
-likelihood of all rows, because the noise is known by then; a part of the rows selects
-those that are worth it. A climb that approaches a
-known optimum is stopped, and so is one that gains little and lies below the best.
+likelihood of all rows, because the noise is known by then, among those that a part of
+the rows ranks first. A climb that approaches a known optimum is stopped, and so is one
+far below the best optimum that gains little.
 """
 
 from collections.abc import Sequence
@@ -128,7 +128,6 @@ class Search:
     def __init__(self, likelihood: Likelihood) -> None:
         self._kernel, self._noise = likelihood.kernel, likelihood.noise
         self._likelihood, self._posterior = likelihood, Posterior(likelihood)
-        self._rough = Posterior(likelihood.thinned(_MOVE_ROWS))
         self._sd_y, sd_x = float(np.std(likelihood.r)), spread(likelihood.X)
         self._design = [
             np.concatenate([point, self._noise.start(self._sd_y)])
@@ -170,6 +169,7 @@ class Search:
         near a known optimum are skipped, and so is a kind whose best move is too
         unlikely.
         """
+        rough = Posterior(self._likelihood.thinned(_MOVE_ROWS))
         for kind in range(len(self._moves_of(self._best.theta))):
             best = self._best
             visited = [*self._began, *(optimum.theta for optimum in self._reached)]
@@ -178,13 +178,12 @@ class Search:
                 for theta in self._moves_of(best.theta)[kind]
                 if _distance(self._kernel, theta, visited) >= _LEAST_MOVE
             ]
-            new.sort(key=self._rough.value, reverse=True)
-            rated = [
-                (self._posterior.value(theta), k, theta)
-                for k, theta in enumerate(new[:_RATED])
-            ]
-            if rated and max(rated)[0] > best.value - _PROMISING:
-                self.climb(max(rated)[2])
+            if not new:
+                continue
+            new.sort(key=rough.value, reverse=True)
+            likeliest = max(new[:_RATED], key=self._posterior.value)
+            if self._posterior.value(likeliest) > best.value - _PROMISING:
+                self.climb(likeliest)
 
     def step_aside(self) -> None:
         """Climb from a point near the best optimum where the likelihood hardly falls.
@@ -283,9 +282,9 @@ def posterior_search(
 
 
 def distinct_optima(kernel: Kernel, reached: Sequence[Start]) -> list[Array]:
-    """Return the distinct optima that starts reached, best first.
+    """Return the distinct points that starts reached, best first.
 
-    Optima too far below the best one are left out.
+    Those too far below the best optimum are left out.
     """
     optima: list[Array] = []
     ranked = sorted(reached, key=lambda start: -start.lml)

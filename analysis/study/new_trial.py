@@ -18,7 +18,7 @@ from analysis.data.samples import TrainingSet
 from analysis.data.series import Array, Indices
 from analysis.gp.noise import LogLinearNoise, Noise
 from analysis.gp.refit import refit_gp
-from analysis.gp.regression import GaussianProcess, LeaveOut
+from analysis.gp.regression import GaussianProcess, LeaveOut, check_outputs
 from analysis.gp.trial_noise import TrialNoise, TrialRows
 from analysis.study.distribution import (
     NewTrialPrediction,
@@ -110,6 +110,9 @@ class NewTrialFit:
         Args:
             start: process with constant noise and the same mean function, fitted to the
                 chosen rows; the search starts from its optima.
+
+        Raises:
+            SettingsError: fewer than 20 spread rows, or outputs that do not vary there.
         """
         process = self._process(start)
         residuals = residual_quantiles(self._held_out(process))
@@ -118,6 +121,7 @@ class NewTrialFit:
     def _process(self, start: GaussianProcess) -> GaussianProcess:
         """Fit the process to the spread rows, with levels and input-dependent noise."""
         inputs, outputs = self._rows.inputs, self._outputs(self._chosen)
+        check_outputs(outputs)
         noise: Noise = LogLinearNoise(inputs.shape[1])
         if len(self._left_out) > 1:
             noise = TrialNoise(noise)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from acquisition.errors import SettingsError
 from analysis.data.samples import SampleTable, TrainingSet
 from analysis.gp.kernels import SquaredExponential
 from analysis.gp.regression import fit_gp
@@ -18,7 +19,7 @@ from analysis.study.models import (
     FitOptions,
     ModelFitter,
 )
-from analysis.study.new_trial import NewTrialFit
+from analysis.study.new_trial import NewTrialFit, spread_rows
 
 PER_TRIAL, CHOSEN = 120, 150
 SE = SquaredExponential()
@@ -133,6 +134,17 @@ def test_one_trial_gives_neither_levels_nor_residuals():
     model = fitted(training(trials_of(skewed, 1), 60))
     assert model.level_sd == 0.0
     assert model.residuals == pytest.approx(normal_scores(SHARES))
+
+
+def test_outputs_that_vary_only_outside_the_spread_rows_are_refused():
+    data = training(trials_of(normal, 4), 60)
+    F_t = np.full(data.rows.count, 5.0)
+    spread = spread_rows(data.lengths, data.chosen.size)
+    varying = np.setdiff1d(data.chosen, spread)
+    F_t[varying] = np.arange(varying.size)
+    rows = SampleTable(data.rows.F_n, data.rows.v_t, F_t)
+    with pytest.raises(SettingsError, match="spanning 0 N"):
+        fitted(TrainingSet(rows, data.lengths, data.chosen))
 
 
 def test_the_rows_of_a_trial_may_come_in_any_order():
