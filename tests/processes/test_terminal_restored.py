@@ -132,6 +132,7 @@ def leave_in_trial(person, leave):
     assert not person.settings()[3] & (termios.ICANON | termios.ECHO)
     person.see("Lift the foot clear of everything", typing=" ")
     leave(person)
+    person.see("[i]dle")
+    person.see("ARM: idle; it sinks slowly, support it.", typing="i")
     assert person.end() == 5
     assert person.settings() == person.before
-    person.see("ARM: idle; it sinks slowly, support it.")
