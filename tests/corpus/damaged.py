@@ -1,14 +1,12 @@
 """Damaged inputs of every kind, read in a process with limited memory."""
 
 import json
-import subprocess
-import sys
+import multiprocessing
 from pathlib import Path
 
 from tests.attacks.attack import Attack, RunBy
 from tests.corpus.readers import READERS
 
-ROOT = Path(__file__).parents[2]
 _EACH_COMMIT = range(1, 4)
 _EACH_NIGHT = [range(first, first + 500) for first in range(1000, 3000, 500)]
 
@@ -22,8 +20,8 @@ def damage_attacks() -> list[Attack]:
 
 
 def _attack(kind: str, seeds: range, run_by: RunBy) -> Attack:
-    def check(_: Path) -> None:
-        problems = read_damaged(kind, seeds)
+    def check(folder: Path) -> None:
+        problems = read_damaged(kind, seeds, folder / "output")
         assert not problems, "; ".join(problems)
 
     return Attack(
@@ -36,26 +34,30 @@ def _attack(kind: str, seeds: range, run_by: RunBy) -> Attack:
     )
 
 
-def read_damaged(kind: str, seeds: range) -> list[str]:
+def read_damaged(kind: str, seeds: range, output: Path) -> list[str]:
     """Read the mutations `seeds` of a kind; return the problems.
 
     A mutation that crashes the reader is reported; a new process reads the others.
     """
+    from tests.corpus.worker import read_mutations  # builds a sample of every kind
+
+    processes = multiprocessing.get_context("forkserver")
+    processes.set_forkserver_preload([read_mutations.__module__])
     problems: list[str] = []
     while seeds:
-        command = [sys.executable, "-m", "tests.corpus.worker", kind]
-        command += [str(seeds.start), str(len(seeds))]
-        done = subprocess.run(
-            command, cwd=ROOT, capture_output=True, text=True, check=False
-        )
-        seed = seeds.start - 1
-        for line in map(json.loads, done.stdout.splitlines()):
-            if "seed" in line:
-                seed = line["seed"]
-            else:
+        process = processes.Process(target=read_mutations, args=(kind, seeds, output))
+        process.start()
+        process.join()
+        seed, other = seeds.start - 1, ""
+        for line in output.read_text().splitlines():
+            if line.startswith('{"seed"'):
+                seed = json.loads(line)["seed"]
+            elif line.startswith('{"error"'):
                 problems.append(f"{kind} {seed}: {line}")
-        if done.returncode == 0:
+            else:
+                other += f"{line}\n"
+        if process.exitcode == 0:
             break
-        problems.append(f"{kind} {seed} ended the reader: {done.stderr[-600:]}")
+        problems.append(f"{kind} {seed} ended the reader: {other[-600:]}")
         seeds = range(max(seed, seeds.start) + 1, seeds.stop)
     return problems
