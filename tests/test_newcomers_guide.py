@@ -43,10 +43,9 @@ def recipe(title):
 
 @pytest.fixture
 def tree(tmp_path):
-    """A copy of the program's tree."""
+    """A copy of the program's tree, with what is compiled of it."""
     for package in PACKAGES:
-        ignored = shutil.ignore_patterns("__pycache__")
-        shutil.copytree(ROOT / package, tmp_path / package, ignore=ignored)
+        shutil.copytree(ROOT / package, tmp_path / package)
     (tmp_path / "tests").mkdir()
     (tmp_path / "tests" / "data").symlink_to(ROOT / "tests" / "data")
     return tmp_path

@@ -12,19 +12,12 @@ from packaging.utils import canonicalize_name
 
 from acquisition.errors import MissingLibraryError
 from acquisition.extras import EXTRAS, import_refusal, require_extra
-from tests.experiments.program import traction, write_config
+from tests.experiments.program import traction
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 SLICE = ROOT / "tests" / "data" / "rehearsal_slice.npz"
 AUTHOR = ("--author", "Family, Given", "--licence", "CC0-1.0")
-FAKE = ("--fake", "--fast", "--operator-script", "auto")
-HIDDEN = """
-import sys
-sys.modules.update(dict.fromkeys({names!r}))
-from experiments.__main__ import main
-sys.exit(main({arguments!r}))
-"""
 
 
 def closure(names):
@@ -57,13 +50,6 @@ def foreign_modules():
         and "traction" not in owners
         and not core & {canonicalize_name(owner) for owner in owners}
     )
-
-
-def without(names, *arguments):
-    """Run a command with `names` not importable; return the finished process."""
-    code = HIDDEN.format(names=names, arguments=[str(word) for word in arguments])
-    words = [sys.executable, "-c", code]
-    return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
 
 
 def test_extras_are_those_of_the_distribution():
@@ -123,32 +109,12 @@ def test_a_command_names_its_missing_extra_first(
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)
-def test_without_any_extra_trials_are_recorded_verified_and_exported(tmp_path):
-    data = ("--data", tmp_path)
+def test_a_notebook_fits_without_extras_and_names_the_extra_of_pictures():
     hidden = foreign_modules()
     assert {name for extra in EXTRAS.values() for name in extra} <= set(hidden)
-    for arguments in (
-        ("run", "TF", *FAKE, "--trials", 2, "--config", write_config(tmp_path)),
-        ("verify", "--all"),
-        ("status",),
-        ("check", "--fake"),
-        ("export", "S001", "--to", tmp_path / "tables"),
-        ("export", "--terrain-db", tmp_path / "terrains.json"),
-        ("identify", tmp_path / "tables", "--terrain-db", tmp_path / "terrains.json"),
-        ("bundle", "S001", "--to", tmp_path / "bundle.zip"),
-    ):
-        done = without(hidden, *arguments, *data)
-        assert done.returncode == 0, (arguments, done.stdout, done.stderr)
-    tables = {path.name for path in (tmp_path / "tables").rglob("T*.csv")}
-    assert {"T01.csv", "T02.csv"} <= tables
-
-
-@pytest.mark.slow
-def test_a_notebook_fits_without_extras_and_names_the_extra_of_pictures():
     code = f"""
 import sys
-sys.modules.update(dict.fromkeys({foreign_modules()!r}))
+sys.modules.update(dict.fromkeys({hidden!r}))
 import traction as tr
 tables = tr.load_tables({str(SLICE)!r}).on("TF")
 print(tr.fit(tables, "tustin"))

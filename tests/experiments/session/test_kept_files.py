@@ -249,7 +249,7 @@ def test_the_remaining_trials_are_exported_with_allow_missing(
 
 def test_a_report_names_a_missing_sidecar_at_its_top(data, config):
     (only_session(data) / "trials" / "T01.json").unlink()
-    arguments = ("report", "S001", "--allow-missing")
+    arguments = ("report", "S001", "--allow-missing", "--models", "tustin")
     done = traction(*arguments, "--data", data, "--config", config)
     assert done.code == 0, done.err
     page = (only_session(data) / "report" / "index.html").read_text()
@@ -283,7 +283,7 @@ def test_the_trials_of_a_copy_are_counted_once(copied):
 
 
 def test_a_report_counts_a_recording_once(copied, config):
-    where = ("--data", copied, "--config", config)
+    where = ("--models", "tustin", "--data", copied, "--config", config)
     refused = traction("report", "--all", *where)
     assert refused.code == 6
     assert "S002 session.json is of S001" in refused.err
