@@ -263,6 +263,15 @@ def test_a_file_that_cannot_be_opened_leaves_the_recorder_idle(bench):
     assert not bench.recorder.is_recording
 
 
+def test_a_trial_is_refused_while_another_is_recorded(bench, tmp_path):
+    bench.start()
+    with pytest.raises(TrialFileError, match="another trial is being recorded"):
+        bench.recorder.start(tmp_path / "T02.mcap", make_header())
+    bench.run(10)
+    bench.recorder.finish("end")
+    assert bench.numbers() == list(range(10))
+
+
 def test_stopping_without_a_trial_raises_a_runtime_error(bench):
     with pytest.raises(RuntimeError):
         bench.recorder.finish("end")
