@@ -74,6 +74,7 @@ def test_arrays_round_trip_bit_for_bit():
         {"type": 5, "fields": {}},
         {"array": "AAAA", "dtype": "<f8", "shape": [1]},
         {"array": "AAAAAAAAAAA=", "dtype": "|O", "shape": [1]},
+        {"array": "AAAAAAAAAAA=", "dtype": "<c8", "shape": [1]},
         {"array": "!", "dtype": "<f8", "shape": []},
         {"number": "1"},
         {"bytes": "AAA"},
