@@ -97,10 +97,11 @@ def test_batches_keep_their_order_and_share_one_progress(n_jobs):
     }
 
 
-def test_only_unstored_tasks_are_run():
-    store = Memory()
+def test_only_unstored_tasks_are_run_and_stored_ones_count_at_once():
+    store, seen = Memory(), []
     store.results = {(fail, 1): 10, (fail, 2): 20}
-    assert run_tasks(fail, [2, 1], 1, store=store) == [20, 10]
+    done = run_tasks(fail, [2, 1], 1, lambda *counts: seen.append(counts), store)
+    assert (done, seen) == ([20, 10], [(2, 2)])
 
 
 def stop(number):
