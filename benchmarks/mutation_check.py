@@ -93,8 +93,11 @@ def _changes(node: ast.AST) -> Iterator[Callable[[Any], None]]:
 
 def _is_negation(node: ast.AST) -> bool:
     """Return whether a node negates a value; a negative literal is data."""
-    is_minus = isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub)
-    return is_minus and not isinstance(node.operand, ast.Constant)
+    return (
+        isinstance(node, ast.UnaryOp)
+        and isinstance(node.op, ast.USub)
+        and not isinstance(node.operand, ast.Constant)
+    )
 
 
 def _is_removable(statement: ast.stmt) -> bool:
