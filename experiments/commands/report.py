@@ -92,6 +92,7 @@ def _report(args: argparse.Namespace) -> None:
         console.say("The report is up to date: its data and options are the same.")
         console.say(f"Open in a browser: {record.page}")
         return
+    console.say("Reading the trials ...")
     # slow to import, and not needed for a report that is up to date
     from experiments.report.choices import ReportRequest, analysis_choices
     from experiments.report.sessions import report_sessions
