@@ -109,6 +109,7 @@ def report_study(
     tested = columns_tested(
         study, reported.with_columns, request.covariates, console, store
     )
+    console.say("Drawing the figures ...")
     context = ReportContext(
         title=reported.title,
         subtitle=reported.subtitle,
