@@ -171,12 +171,16 @@ def prominent_maxima(F_t: Array) -> list[int]:
     The prominence is the height above the higher of the valleys on both sides, each of
     which ends at the next higher force. Of a maximum of several equal rows, the first.
     """
-    forces: list[float] = F_t.tolist()
+    is_turn = np.ones(F_t.size, dtype=np.bool_)  # no other row is a maximum or valley
+    is_turn[1:-1] = (F_t[1:-1] > F_t[:-2]) != (F_t[2:] > F_t[1:-1])
+    rows = np.flatnonzero(is_turn)
+    turns = F_t[rows]
+    forces: list[float] = turns.tolist()
     prominence = np.minimum(_depths(forces), _depths(forces[::-1])[::-1])[1:-1]
-    inner = F_t[1:-1]
-    is_top = (inner > F_t[:-2]) & (inner >= F_t[2:])
+    inner = turns[1:-1]
+    is_top = (inner > turns[:-2]) & (inner >= turns[2:])
     is_top &= prominence >= np.maximum(_PROMINENCE, _PROMINENCE_SHARE * inner)
-    return (np.flatnonzero(is_top) + 1).tolist()
+    return rows[1:-1][is_top].tolist()
 
 
 def _depths(forces: Sequence[float]) -> list[float]:
