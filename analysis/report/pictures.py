@@ -54,13 +54,7 @@ def png_of_few_colours(pixels: Pixels, dpi: int) -> bytes:
     begins = np.flatnonzero(flat[1:] != flat[:-1]) + 1
     starts = np.concatenate([[0], begins])  # runs of one colour: a tenth of the pixels
     lengths = np.diff(starts, append=flat.size)
-    inks = flat[starts].astype(np.intp)
-    is_used = np.zeros(_WHITE + 1, dtype=np.bool_)
-    is_used[inks] = True
-    colours = np.flatnonzero(is_used)
-    number = np.empty(is_used.size, dtype=np.intp)
-    number[colours] = np.arange(colours.size)
-    numbers = number[inks]
+    colours, numbers = np.unique(flat[starts], return_inverse=True)
     counts = np.bincount(numbers, weights=lengths).astype(np.intp)
     shades = np.column_stack([colours, colours >> 8, colours >> 16]).astype(np.uint8)
     palette, palette_index = _palette(shades, counts)
