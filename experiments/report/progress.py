@@ -4,6 +4,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 
 from acquisition.clock import NS_PER_S, Clock, SystemClock
+from acquisition.cores import available_cores
 from experiments.operator.console import Console
 
 _STEP = 0.1  # share of the work between two plain lines
@@ -13,31 +14,49 @@ _BAR = 30  # characters
 class ProgressLine:
     """Shows (done, total) as a bar with the time left; plain lines off a terminal.
 
+    The pace counts from the first result computed here: what was stored appears at
+    once, and the first result also waits for its process to start. It is measured over
+    whole rounds of the results that are computed at a time.
+
     Args:
         console: output.
         clock: clock of the elapsed time.
         what: counted items, e.g. "fits".
+        abreast: items computed at a time, whose results appear together.
     """
 
-    def __init__(self, console: Console, clock: Clock, what: str) -> None:
+    def __init__(
+        self, console: Console, clock: Clock, what: str, abreast: int = 1
+    ) -> None:
         self._console, self._clock, self._what = console, clock, what
-        self._start_ns = clock.now_ns()
-        self._at_first: int | None = None
+        self._abreast = abreast
+        self._stored = 0
+        self._first: tuple[int, int] | None = None  # done, and when [ns]
+        self._pace: float | None = None  # s for an item
         self._reported = 0.0
 
     def __call__(self, done: int, total: int) -> None:
         """Show that `done` of `total` items are done."""
-        if self._at_first is None:
-            # results of an earlier run appear at once and do not count for the speed
-            self._at_first = done - 1 if done == 1 else done
-        elapsed = (self._clock.now_ns() - self._start_ns) / NS_PER_S
-        left = time_left(done - self._at_first, total - done, elapsed)
+        left = self._time_left(done, total)
         text = progress_text(done, total, left, self._what)
         if self._console.is_live:
             self._console.panel([text])
         elif done == total or done / total >= self._reported + _STEP:
             self._reported = done / total
             self._console.say(text)
+
+    def _time_left(self, done: int, total: int) -> float | None:
+        if self._first is None:
+            if done > 1 and not self._stored:
+                self._stored = done
+            else:
+                self._first = done, self._clock.now_ns()
+            return None
+        first, start_ns = self._first
+        if (done - first) % self._abreast == 0:
+            elapsed = (self._clock.now_ns() - start_ns) / NS_PER_S
+            self._pace = elapsed / (done - first)
+        return None if self._pace is None else self._pace * (total - done)
 
     def end(self) -> None:
         """Remove the bar; safe to repeat."""
@@ -47,24 +66,11 @@ class ProgressLine:
 @contextmanager
 def fitting(console: Console) -> Generator[ProgressLine]:
     """Show the progress of the fits inside the block."""
-    progress = ProgressLine(console, SystemClock(), "fits")
+    progress = ProgressLine(console, SystemClock(), "fits", available_cores())
     try:
         yield progress
     finally:
         progress.end()
-
-
-def time_left(finished: int, left: int, elapsed: float) -> float | None:
-    """Remaining time [s] at the speed so far; None if that is unknown.
-
-    Args:
-        finished: number of items finished in `elapsed`.
-        left: number of remaining items.
-        elapsed: time since the start of the first [s].
-    """
-    if left == 0:
-        return 0.0
-    return elapsed / finished * left if finished > 0 else None
 
 
 def progress_text(done: int, total: int, left: float | None, what: str) -> str:
