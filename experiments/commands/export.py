@@ -89,6 +89,7 @@ def run(args: argparse.Namespace) -> int:
             "models for other programs with both and --for NAME,..?",
             hint=f"Name one of the three. {_NOTHING}",
         )
+    console.say("Reading the trials ...")
     return _export_sessions(args, console)
 
 

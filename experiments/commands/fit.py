@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from experiments.arguments import (
     add_analysis_options,
@@ -13,6 +14,9 @@ from experiments.arguments import (
     add_seed_option,
     add_table_options,
 )
+
+if TYPE_CHECKING:
+    from experiments.operator.console import Console
 
 EXAMPLES = """\
   traction fit trials.npz --to fit
@@ -59,26 +63,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Fit tables and write the report."""
     from acquisition.extras import require_extra
+    from experiments.operator.console import Console
 
     require_extra("report")  # before the page is imported
     if args.scheduler:
         require_extra("cluster")
+    console = Console(color=not args.no_color)
+    console.say("Reading the tables ...")
     from experiments.report.workers import workers_of_report
 
     with workers_of_report(are_needed=not args.scheduler):
-        return _fit(args)
+        return _fit(args, console)
 
 
-def _fit(args: argparse.Namespace) -> int:
+def _fit(args: argparse.Namespace, console: Console) -> int:
     from acquisition.errors import SettingsError
     from analysis.study.covariates import TRAVEL
     from analysis.tables.columns import parse_covariates, parse_inputs
     from experiments.named_tables import load_named_tables
-    from experiments.operator.console import Console
     from experiments.report.choices import ReportRequest, analysis_choices
     from experiments.report.external_tables import report_tables_of_trials
 
-    console = Console(color=not args.no_color)
     choices = analysis_choices(args)
     columns = () if args.covariate is None else parse_covariates(args.covariate)
     inputs = () if args.inputs is None else parse_inputs(args.inputs)

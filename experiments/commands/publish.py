@@ -44,9 +44,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the publication; returns the exit code."""
+    from experiments.operator.console import Console
+
+    console = Console(color=not args.no_color)
+    console.say("Reading the trials ...")  # slow to import and to read
     from experiments.export.credits import LICENCES, parse_author
     from experiments.export.publication import PublishRequest, publish_sessions
-    from experiments.operator.console import Console
     from experiments.report.choices import ReportRequest
     from experiments.report.chosen_sessions import choose_sessions, report_missing
     from experiments.settings.load import load_settings
@@ -55,7 +58,6 @@ def run(args: argparse.Namespace) -> int:
     request = PublishRequest(
         args.title, args.description, authors, LICENCES[args.licence]
     )
-    console = Console(color=not args.no_color)
     sessions = choose_sessions(args.data, args.sessions, every=args.all)
     order = [row.name for row in load_settings(args.config).matrix.terrains]
     missing = report_missing(sessions, console, allow_missing=args.allow_missing)

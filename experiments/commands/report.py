@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from experiments.arguments import (
     add_allow_missing_option,
@@ -14,6 +14,9 @@ from experiments.arguments import (
     add_scheduler_option,
     add_seed_option,
 )
+
+if TYPE_CHECKING:
+    from experiments.report.choices import ReportRequest
 
 EXAMPLES = """\
   traction report S012                             one session, in its own folder
@@ -68,15 +71,6 @@ def run(args: argparse.Namespace) -> int:
     require_extra("report")
     if args.scheduler:
         require_extra("cluster")
-    from experiments.report.workers import workers_of_report
-
-    is_new = not args.scheduler and not _is_kept(Path(args.data), args.to)
-    with workers_of_report(are_needed=is_new):
-        _report(args)
-    return 0
-
-
-def _report(args: argparse.Namespace) -> None:
     from experiments.operator.console import Console, PageRecorder
     from experiments.report.chosen_sessions import choose_sessions, report_missing
     from experiments.report.up_to_date import record_of
@@ -91,23 +85,18 @@ def _report(args: argparse.Namespace) -> None:
     if not args.json and record.is_current():
         console.say("The report is up to date: its data and options are the same.")
         console.say(f"Open in a browser: {record.page}")
-        return
+        return 0
     console.say("Reading the trials ...")
     # slow to import, and not needed for a report that is up to date
-    from experiments.report.choices import ReportRequest, analysis_choices
-    from experiments.report.sessions import report_sessions
+    from experiments.report.workers import workers_of_report
 
-    wanted = ReportRequest(
-        args.seed,
-        terrains,
-        args.scheduler,
-        analysis_choices(args),
-        covariates=_covariates(args.covariate),
-        out=args.to,
-        with_pdf=args.pdf,
-    )
-    missing = report_missing(sessions, console, allow_missing=args.allow_missing)
-    page = report_sessions(sessions, data, replace(wanted, missing=missing), console)
+    is_new = not args.scheduler and not _is_kept(data, args.to)
+    with workers_of_report(are_needed=is_new):
+        from experiments.report.sessions import report_sessions
+
+        missing = report_missing(sessions, console, allow_missing=args.allow_missing)
+        wanted = _request(args, terrains, missing)
+        page = report_sessions(sessions, data, wanted, console)
     if not missing and not _left_out(page):  # report missing data every time
         record.write()
     if args.json:
@@ -115,6 +104,25 @@ def _report(args: argparse.Namespace) -> None:
         Console(color=False).say(_as_json(page, names, missing))
     else:
         console.say(f"Open in a browser: {page}")
+    return 0
+
+
+def _request(
+    args: argparse.Namespace, terrains: list[str], missing: list[str]
+) -> ReportRequest:
+    """Return the report that the arguments ask for."""
+    from experiments.report.choices import ReportRequest, analysis_choices
+
+    return ReportRequest(
+        args.seed,
+        terrains,
+        args.scheduler,
+        analysis_choices(args),
+        missing=missing,
+        covariates=_covariates(args.covariate),
+        out=args.to,
+        with_pdf=args.pdf,
+    )
 
 
 def _options(args: argparse.Namespace) -> str:

@@ -27,6 +27,10 @@ def reported(recorded, tmp_path_factory):
     shutil.copytree(recorded.data, data)
     done = traction("report", "S001", "--data", data)
     assert done.code == 0, done.err
+    reading, fitting, *_ = lines = done.out.splitlines()
+    assert reading == "Reading the trials ..."
+    assert fitting.endswith(": fitting ...")
+    assert lines.index("Drawing the figures ...") > 2
     return data, numbers(data)
 
 
