@@ -41,10 +41,15 @@ docs: $(DOCS)  ## the documentation: docs/_build/html/index.html
 
 demo: $(USED)  ## two simulated sessions of ten trials, then the report of both
 	rm -rf demo
-	@echo "Two simulated sessions side by side, ten trials each; their logs: demo/*.log"
+	@echo "Two simulated sessions side by side, ten trials each (one to three minutes);" \
+	  "their logs: demo/*.log"
 	@mkdir -p demo
 	@$(BIN)/traction run S0 --fake --fast --data demo > demo/S0.log 2>&1 & first=$$!; \
 	  $(BIN)/traction run TF --fake --fast --data demo > demo/TF.log 2>&1 & second=$$!; \
+	  told=0; while kill -0 $$first 2> /dev/null || kill -0 $$second 2> /dev/null; do \
+	    sleep 1; kept=$$(cat demo/*.log | grep -c 'kept\. \[u\] within'); \
+	    if [ $$kept -ge $$((told + 2)) ]; then echo "$$kept of 20 trials"; told=$$kept; fi; \
+	  done; \
 	  wait $$first || { cat demo/S0.log; exit 1; }; \
 	  wait $$second || { cat demo/TF.log; exit 1; }
 	$(BIN)/traction status --data demo
