@@ -33,7 +33,6 @@ _WARM = (
     "experiments.run.session",
     "experiments.run.quality",
     "analysis.data",
-    "scipy.signal",  # unused by sessions, but without it the first replies come late
     "fakes.serving.puck_server",
 )
 # File owners and change times differ in the guest: git would read all files again.
