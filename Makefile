@@ -46,6 +46,7 @@ demo: $(USED)  ## two simulated sessions of ten trials, then the report of both
 	@mkdir -p demo
 	@$(BIN)/traction run S0 --fake --fast --data demo > demo/S0.log 2>&1 & first=$$!; \
 	  $(BIN)/traction run TF --fake --fast --data demo > demo/TF.log 2>&1 & second=$$!; \
+	  trap 'kill $$first $$second 2> /dev/null; exit 130' INT TERM; \
 	  told=0; while kill -0 $$first 2> /dev/null || kill -0 $$second 2> /dev/null; do \
 	    sleep 1; kept=$$(cat demo/*.log | grep -c 'kept\. \[u\] within'); \
 	    if [ $$kept -ge $$((told + 2)) ]; then echo "$$kept of 20 trials"; told=$$kept; fi; \
