@@ -38,6 +38,16 @@ def test_golden_overload_names_both_axes():
     assert optoforce.status_texts(0x0280) == ("Fx overloaded", "Fz overloaded")
 
 
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize("axis", range(6))
+def test_an_axis_at_full_counts_is_saturated_whatever_the_status_says(axis, sign):
+    counts = [1, 2, 3, 4, 5, 6]
+    counts[axis] = sign * optoforce.FULL_COUNTS
+    data = optoforce.encode_frame(OptoForceFrame(1, 0, tuple(counts)))
+    (reading,) = optoforce.scanner(SENSITIVITY).feed(data)
+    assert reading.saturated == 1 << axis
+
+
 @pytest.mark.parametrize(
     ("status", "words"),
     [
