@@ -6,7 +6,7 @@ import pytest
 import experiments.operator.auto_operator as operator
 from acquisition.errors import PreflightError, SettingsError
 from experiments.calibration.taught_place import EndTouch, fit_ends
-from experiments.settings.load import load_settings
+from experiments.settings.load import load_settings, load_untaught
 from experiments.settings.places import TaughtPlace
 from tests.experiments.program import traction, write_config
 
@@ -94,3 +94,14 @@ def test_scattered_touches_of_one_end_are_refused():
     ends = fit_ends(near, far[:1] * 3)
     assert ends.travel == pytest.approx(0.4)
     assert (ends.heading, ends.incline) == pytest.approx((0.0, 0.0))
+
+
+def test_an_untaught_place_needs_no_settings_of_its_own(tmp_path):
+    _, row = load_untaught(None, "bay_2", None)
+    assert (row.name, row.foot) == ("place-bay-2", "tread")
+    config = write_config(tmp_path).rename(tmp_path / "other.toml")
+    for path, name in ((None, "rig.toml"), (config, "other.toml")):
+        with pytest.raises(SettingsError) as refused:
+            load_untaught(path, "bay2", "shoe")
+        assert str(refused.value).startswith(f"There is no foot 'shoe' in {name}.")
+        assert "Feet: tread, bare" in str(refused.value.hint)
