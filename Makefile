@@ -48,7 +48,7 @@ demo: $(USED)  ## two simulated sessions of ten trials, then the report of both
 	  $(BIN)/traction run TF --fake --fast --data demo > demo/TF.log 2>&1 & second=$$!; \
 	  trap 'kill $$first $$second 2> /dev/null; exit 130' INT TERM; \
 	  told=0; while kill -0 $$first 2> /dev/null || kill -0 $$second 2> /dev/null; do \
-	    sleep 1; kept=$$(cat demo/*.log | grep -c 'kept\. \[u\] within'); \
+	    sleep 1; kept=$$(ls demo/sessions/*/trials/T??.json 2> /dev/null | wc -l); \
 	    if [ $$kept -ge $$((told + 2)) ]; then echo "$$kept of 20 trials"; told=$$kept; fi; \
 	  done; \
 	  wait $$first || { cat demo/S0.log; exit 1; }; \

@@ -30,7 +30,7 @@ class ProgressLine:
     ) -> None:
         self._console, self._clock, self._what = console, clock, what
         self._abreast = abreast
-        self._stored = 0
+        self._has_stored = False
         self._first: tuple[int, int] | None = None  # done, and when [ns]
         self._pace: float | None = None  # s for an item
         self._reported = 0.0
@@ -47,8 +47,8 @@ class ProgressLine:
 
     def _time_left(self, done: int, total: int) -> float | None:
         if self._first is None:
-            if done > 1 and not self._stored:
-                self._stored = done
+            if done > 1 and not self._has_stored:
+                self._has_stored = True
             else:
                 self._first = done, self._clock.now_ns()
             return None
