@@ -17,28 +17,12 @@ from analysis.study.study import Study
 from analysis.study.tasks import run_tasks
 
 _MOST_DRAWING = 4  # drawing processes
-_SLOWEST_FIRST = tuple(FIGURES)[::-1]
 _MANY_TERRAINS = 2  # terrains from which several processes pay off
-
-
-def report_figures(shown: ShownNumbers) -> list[ReportFigure]:
-    """Draw every figure that has numbers, in the order of the page.
-
-    Every figure is drawn by one process, so the number of processes does not matter.
-    """
-    count = _processes(shown.results.study)
-    shares = [FigureTask(shown, _SLOWEST_FIRST[k::count]) for k in range(count)]
-    drawn = {
-        figure.picture.key: figure
-        for figures in run_tasks(draw_figures, shares, count)
-        for figure in figures
-    }
-    return [drawn[key] for key in FIGURES if key in drawn]
 
 
 @dataclass(frozen=True, slots=True)
 class FigureTask:
-    """Figures to draw in one process.
+    """Figures to draw.
 
     Attributes:
         shown: numbers that they show.
@@ -47,6 +31,22 @@ class FigureTask:
 
     shown: ShownNumbers
     keys: Sequence[str]
+
+
+def report_figures(task: FigureTask) -> list[ReportFigure]:
+    """Draw those of the figures that have numbers, in the order of the keys.
+
+    Every figure is drawn by one process, so the number of processes does not matter.
+    """
+    count = _processes(task.shown.results.study)
+    slowest_first = task.keys[::-1]
+    shares = [FigureTask(task.shown, slowest_first[k::count]) for k in range(count)]
+    drawn = {
+        figure.picture.key: figure
+        for figures in run_tasks(draw_figures, shares, count)
+        for figure in figures
+    }
+    return [drawn[key] for key in task.keys if key in drawn]
 
 
 def draw_figures(task: FigureTask) -> list[ReportFigure]:
@@ -72,22 +72,20 @@ def _draw(key: str, shown: ShownNumbers) -> ReportFigure | None:
     )
 
 
-def cached_figures(
-    shown: ShownNumbers, store: ResultStore | None
-) -> list[ReportFigure]:
-    """Return every figure that has numbers, from the cache or newly drawn.
+def cached_figures(task: FigureTask, store: ResultStore | None) -> list[ReportFigure]:
+    """Return those of the figures that have numbers, from the cache or newly drawn.
 
     Args:
-        shown: numbers that they show.
+        task: figures, and the numbers that they show.
         store: cache of figures; None = always draw.
     """
     if store is None:
-        return report_figures(shown)
-    cached = store.get(report_figures, shown)
+        return report_figures(task)
+    cached = store.get(report_figures, task)
     if isinstance(cached, tuple) and all(isinstance(f, ReportFigure) for f in cached):
         return list(cached)
-    drawn = report_figures(shown)
-    store.put(report_figures, shown, drawn)
+    drawn = report_figures(task)
+    store.put(report_figures, task, drawn)
     return drawn
 
 

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -88,7 +88,10 @@ def report_study(
     console: Console,
     store: ResultStore | None = None,
 ) -> Path:
-    """Repeat a study under other choices, test its columns, write and return its page.
+    """Write the page of a study, and return it.
+
+    The first sections can be read while the study is repeated under other choices, its
+    columns are tested and the remaining figures are drawn.
 
     Args:
         reported: the study.
@@ -101,39 +104,48 @@ def report_study(
         SettingsError: the folder cannot be written.
         MissingLibraryError: the extra `report` is not installed.
     """
-    from analysis.report.page import write_report  # slow, and not needed for exports
+    # slow to import, and not needed for exports
+    from analysis.report.page import page_of, write_first_sections, write_report
 
     study = reported.study
-    variants = request.choices.variants
-    others = _repeat_study(study, reported.trials, variants, console, store)
-    tested = columns_tested(
-        study, reported.with_columns, request.covariates, console, store
-    )
-    console.say("Drawing the figures ...")
+    results = compute_results(study, reported.rig)
     context = ReportContext(
         title=reported.title,
         subtitle=reported.subtitle,
         is_simulated=study.simulated,
         is_foreign=reported.is_foreign,
         generated_utc=iso_utc(SystemClock().utc_ns()),
+        tables=[*reported.cells, *reported.tables],
+        warnings=reported.warnings,
+        rig=reported.rig,
+        with_pdf=request.with_pdf,
+        results=results,
+        store=store,
+    )
+    console.say("Drawing the paper's figures ...")
+    first = write_first_sections(results, out, context)
+    console.say(f"Summary and the paper's figures, to open now: {page_of(out)}")
+    variants = request.choices.variants
+    others = _repeat_study(study, reported.trials, variants, console, store)
+    tested = columns_tested(
+        study, reported.with_columns, request.covariates, console, store
+    )
+    console.say("Drawing the other figures ...")
+    whole = replace(
+        context,
         tables=[
             *reported.cells,
             *(comparison_table(choice, study, other) for choice, other in others),
             *covariate_tables(tested),
             *reported.tables,
         ],
-        warnings=reported.warnings,
-        rig=reported.rig,
         further_numbers={
             "what_if": [plain_choice(c, study, other) for c, other in others],
             "covariates": [result.numbers() for result in tested],
             **reported.numbers,
         },
-        with_pdf=request.with_pdf,
-        results=compute_results(study, reported.rig),
-        store=store,
     )
-    return write_report(study, out, context)
+    return write_report(study, out, whole, first)
 
 
 def _repeat_study(

@@ -31,8 +31,8 @@ def drawings(monkeypatch):
     drawn = []
 
     @wraps(drawing.report_figures)  # pictures are stored by its module and name
-    def draw(shown):
-        drawn.append(shown)
+    def draw(task):
+        drawn.append(task)
         return [FIGURE]
 
     monkeypatch.setattr(drawing, "report_figures", draw)

@@ -1,14 +1,23 @@
 import json
+import re
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from analysis.report.page import ReportContext, ReportTable, render_page, write_report
+from analysis.report.page import (
+    ReportContext,
+    ReportTable,
+    page_of,
+    render_page,
+    write_first_sections,
+    write_report,
+)
 from analysis.report.page_model import cell_text, number_columns
 from analysis.report.pictures import Picture
 from analysis.report.results import compute_results
+from analysis.report.section import ReportSection
 from analysis.report.sections.paper.curves import caption_gp
 from analysis.report.sections.paper.errors import (
     draw_cross_bars,
@@ -63,6 +72,11 @@ def context(**changes):
     return ReportContext(**(choices | changes))
 
 
+WARMTH = ReportTable(
+    "Warmth", ("terrain", "deg C"), [["S0", "21"]], section=ReportSection.HEALTH
+)
+
+
 @pytest.fixture(scope="module")
 def written(small_study, tmp_path_factory):
     folder = tmp_path_factory.mktemp("out")
@@ -71,6 +85,30 @@ def written(small_study, tmp_path_factory):
         small_study, folder, context(is_simulated=True, tables=[table], with_pdf=True)
     )
     return folder, path, Page(path.read_text())
+
+
+def headings(page):
+    return re.findall("<h2>(.*?)</h2>", page.read_text())
+
+
+def test_the_first_sections_can_be_opened_before_the_others(small_study, tmp_path):
+    results = compute_results(small_study)
+    shown = write_first_sections(results, tmp_path, context(tables=[WARMTH]))
+    page = page_of(tmp_path)
+    undone = "Analyses that were not completed"
+    first = ["Summary", "The paper&#39;s table and figures", undone]
+    assert headings(page) == first
+    assert "Warmth" not in page.read_text()  # a table of a later section
+    assert "This page is incomplete" in page.read_text()
+    assert {f.stem for f in (tmp_path / "figures").iterdir()} == {
+        figure.picture.key for figure in shown
+    }
+    whole = context(results=results, tables=[WARMTH])
+    assert write_report(small_study, tmp_path, whole, shown) == page
+    text = page.read_text()
+    assert "incomplete" not in text
+    assert "Warmth" in text
+    assert text == write_report(small_study, tmp_path / "whole", whole).read_text()
 
 
 def test_the_page_needs_no_external_resource(written):

@@ -30,7 +30,12 @@ def reported(recorded, tmp_path_factory):
     reading, fitting, *_ = lines = done.out.splitlines()
     assert reading == "Reading the trials ..."
     assert fitting.endswith(": fitting ...")
-    assert lines.index("Drawing the figures ...") > 2
+    drawing = lines.index("Drawing the paper's figures ...")
+    assert drawing > 2
+    opened, others = lines[drawing + 1 : drawing + 3]
+    assert opened.startswith("Summary and the paper's figures, to open now: ")
+    assert opened.endswith("index.html")
+    assert others == "Drawing the other figures ..."
     return data, numbers(data)
 
 
