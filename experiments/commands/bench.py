@@ -33,11 +33,6 @@ def run(args: argparse.Namespace) -> int:
 
     from acquisition.errors import PreflightError, SettingsError
     from experiments.operator.console import WARNING, Console
-    from experiments.preflight.connecting import connect_rig
-    from experiments.preflight.loop_benchmark import run_bench
-    from experiments.preflight.preflight import start_devices
-    from experiments.rig.processes import MultiProcessBackend
-    from experiments.rig.rig import FakeOptions
     from experiments.settings.load import load_settings
 
     if not 1.0 <= args.seconds <= _LONGEST:
@@ -47,6 +42,15 @@ def run(args: argparse.Namespace) -> int:
         )
     console = Console(color=not args.no_color, goes_on=True)
     settings = load_settings(args.config)
+    if not args.json:
+        console.say(f"Measuring the loop for {args.seconds:g} s ...")
+    # slow to import
+    from experiments.preflight.connecting import connect_rig
+    from experiments.preflight.loop_benchmark import run_bench
+    from experiments.preflight.preflight import start_devices
+    from experiments.rig.processes import MultiProcessBackend
+    from experiments.rig.rig import FakeOptions
+
     fake = FakeOptions("processes", seed=1) if args.fake else None
     rig = connect_rig(settings, settings.matrix.terrains[0], fake)
     backend = rig.backend

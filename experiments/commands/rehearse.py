@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from experiments.rehearsal.plan import AcceptancePlan
 
 EXAMPLES = """\
-  traction rehearse --seed 2                all terrains, ten trials each, 43 bands
+  traction rehearse --seed 2                all terrains, ten trials each, every band
   traction rehearse --config lab/rig.toml   the terrains of a matrix of your own"""
 
 _FAILED = 6

@@ -1,4 +1,4 @@
-"""The 43 bands that a simulated study has to meet, as data.
+"""The bands that a simulated study has to meet, as data.
 
 Each band corresponds to a statement of the paper or an implication of its models; they
 were set on simulations of another program. A measure may have several values, one per
