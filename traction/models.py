@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from acquisition.errors import SettingsError
+from acquisition.wording import counted
 from analysis.data.samples import TrainingSet
 from analysis.data.terrain_kinds import terrain_kind
 from analysis.study.break_away_fit import BreakAwayOptions
@@ -77,7 +78,7 @@ class Model:
             values = ": " + ", ".join(part.removesuffix(" 1") for part in parts)
         doubts = f" [{_shortened(self.flags)}]" if self.flags else ""
         return (
-            f"<{TITLES[self.name]} of {self.terrain}, {self.trials} trials, "
+            f"<{TITLES[self.name]} of {self.terrain}, {counted(self.trials, 'trial')}, "
             f"{self.samples} samples{values}{doubts}>"
         )
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from acquisition.errors import SettingsError
+from acquisition.wording import counted
 from analysis.data.prepare import PreparedTrial
 from analysis.data.terrain_kinds import terrain_kind
 from experiments.export.quantities import KEPT
@@ -35,8 +36,7 @@ class TrialSet(Sequence[Trial]):
 
     def __repr__(self) -> str:
         kind = ", simulated" if any(t.is_simulated for t in self.trials) else ""
-        count = len(self.trials)
-        trials = f"{count} trial{'' if count == 1 else 's'}"
+        trials = counted(len(self.trials), "trial")
         return f"<{self.name}: {trials} on {', '.join(self.terrains) or '-'}{kind}>"
 
     def __len__(self) -> int:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.errors import SettingsError
+from acquisition.wording import counted
 from analysis.data.plausibility import HEADING
 from analysis.data.prepare import moving_average
 from analysis.data.series import Array
@@ -324,7 +325,7 @@ def _topics(path: Path) -> Iterator[str]:
                 frames.setdefault(message.topic, header.frame_id)
             of_topic.stamps.append(stamp_ns)
             of_topic.received.append(message.received_ns)
-        yield f"{path}: {log.format}, {len(log.topics)} topics"
+        yield f"{path}: {log.format}, {counted(len(log.topics), 'topic')}"
         for name, topic in list(log.topics.items())[:_MOST]:
             parts = [f"  {name}  {topic.type_name}", *_rates(times[name])]
             if frame := frames.get(name):
@@ -336,7 +337,7 @@ def _topics(path: Path) -> Iterator[str]:
 
 
 def _rates(times: _Times) -> Iterator[str]:
-    yield f"{len(times.received)} messages"
+    yield counted(len(times.received), "message")
     stamps = np.array(times.stamps, np.int64)
     by_stamp, by_receipt = _rate(stamps), _rate(np.array(times.received, np.int64))
     if by_stamp is not None and stamps.min() > 0:

@@ -11,6 +11,7 @@ import numpy as np
 
 from acquisition.clock import RATE_HZ
 from acquisition.errors import SettingsError
+from acquisition.wording import counted
 from analysis.data.series import Array
 from analysis.tables.columns import COLUMNS
 from analysis.tables.refusals import refusal
@@ -130,12 +131,12 @@ def _missing(path: Path, table: TrialTable, rows: Array) -> Iterator[str]:
         )
     if count:
         first = table.location(int(lacking.argmax()))
-        yield f"{_counted(count)} without a value dropped, the first is {first}"
+        yield f"{counted(count, 'row')} without a value dropped, the first is {first}"
     infinite = np.isinf(rows).any(axis=1)
     if infinite.any():
         first = table.location(int(infinite.argmax()))
-        count = int(np.count_nonzero(infinite))
-        yield f"{_counted(count)} with an infinite value dropped, the first is {first}"
+        count = counted(int(np.count_nonzero(infinite)), "row")
+        yield f"{count} with an infinite value dropped, the first is {first}"
 
 
 def _units(table: TrialTable, rows: Array) -> Iterator[str]:
@@ -152,10 +153,6 @@ def _units(table: TrialTable, rows: Array) -> Iterator[str]:
             )
 
 
-def _counted(rows: int) -> str:
-    return f"{rows} row{'' if rows == 1 else 's'}"
-
-
 def _outliers(table: TrialTable, rows: Array) -> Iterator[str]:
     """Report values far beyond nearly all others: spikes, and missing-value codes."""
     if len(rows) < _FEWEST:
@@ -170,9 +167,9 @@ def _outliers(table: TrialTable, rows: Array) -> Iterator[str]:
         if is_rare and size.max() > _WILD * max(others, floor):
             first = int(same.argmax())
             yield (
-                f"{COLUMNS[k]} is {rows[first, k]:.6g} in {_counted(count)}, the first "
-                f"is {table.location(first)}, elsewhere {others:.3g} at most: a code "
-                "for a missing value? Leave the cells empty"
+                f"{COLUMNS[k]} is {rows[first, k]:.6g} in {counted(count, 'row')}, the "
+                f"first is {table.location(first)}, elsewhere {others:.3g} at most: a "
+                "code for a missing value? Leave the cells empty"
             )
             continue
         spared = max(3, -(-size.size // 1000))

@@ -20,6 +20,7 @@ import numpy as np
 
 from acquisition.errors import SettingsError
 from acquisition.files import UnfitFileError, open_regular
+from acquisition.wording import counted
 from analysis.data.memory import share_of_memory
 from analysis.data.series import Array, TractionSeries
 from analysis.tables.checks import check_clock, check_order, notes_of
@@ -230,7 +231,9 @@ class _TableForm:
             _check_inputs(path, table.further)
             is_lacking = ~np.isfinite(np.column_stack(further)).all(axis=1)
             if count := int(np.count_nonzero(is_lacking)):
-                notes.append(f"{count} rows without a value of an input dropped")
+                notes.append(
+                    f"{counted(count, 'row')} without a value of an input dropped"
+                )
         terrain = self.terrain or origin.terrain or DEFAULT_TERRAIN
         return TractionSeries(
             terrain,

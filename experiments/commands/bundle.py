@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from acquisition.wording import counted
+
 EXAMPLES = """\
   traction bundle S012                      S012.bundle.zip in this folder
   traction bundle S012 bus.log              a log of the bus with it"""
@@ -46,5 +48,5 @@ def run(args: argparse.Namespace) -> int:
     for name, why in contents.left_out.items():
         console.say(f"{WARNING} left out: {name} ({why})")
     size = to.stat().st_size / 1e6
-    console.say(f"{len(contents.files)} files, {size:.1f} MB: {to}")
+    console.say(f"{counted(len(contents.files), 'file')}, {size:.1f} MB: {to}")
     return 0

@@ -7,6 +7,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from acquisition.wording import counted
+
 if TYPE_CHECKING:
     from acquisition.trial_file.recover import Recovery
     from experiments.operator.console import Console
@@ -59,7 +61,8 @@ def run(args: argparse.Namespace) -> int:
     failed = sum(result["state"] in {"failed", "copied"} for result in results)
     if len(sources) > 1:
         console.say(
-            f"{len(sources)} files: {len(sources) - failed} done, {failed} not."
+            f"{counted(len(sources), 'file')}: {len(sources) - failed} done, "
+            f"{failed} not."
         )
     if args.json:
         Console(color=False).say(json.dumps(results, indent=1, ensure_ascii=False))
@@ -137,7 +140,9 @@ def _print_recovery(recovery: Recovery, obstacle: str, console: Console) -> None
     from experiments.operator.console import GOOD, WARNING
 
     source, verified = recovery.source, recovery.verified
-    content = f"{verified.cycles} cycles, {recovery.messages} messages"
+    content = (
+        f"{counted(verified.cycles, 'cycle')}, {counted(recovery.messages, 'message')}"
+    )
     if verified.cycles:
         content = f"{verified.duration:.2f} s, {content}"
     if recovery.path == source:

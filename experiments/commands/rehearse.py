@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from acquisition.wording import counted
 from experiments.arguments import add_simulation_options, friction_share
 from experiments.rig.deviation_options import add_truth, mount_of
 
@@ -69,8 +70,8 @@ def run(args: argparse.Namespace) -> int:
     console = Console(color=not args.no_color, goes_on=True)
     folder = _free_folder(Path(args.data), args.seed)
     console.say(
-        f"traction rehearse        SIMULATED · {len(rows)} terrains x {plan.trials} "
-        f"trials · seed {plan.seed} · {folder}"
+        f"traction rehearse        SIMULATED · {counted(len(rows), 'terrain')} x "
+        f"{counted(plan.trials, 'trial')} · seed {plan.seed} · {folder}"
     )
     plan = calibrate_arm(plan, folder)
     if plan.config is not None and args.config is None:

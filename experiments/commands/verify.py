@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from acquisition.wording import counted
+
 if TYPE_CHECKING:
     from experiments.operator.console import Console
     from experiments.session.store import SessionFolder
@@ -69,7 +71,8 @@ def run(args: argparse.Namespace) -> int:
     for deviation in deviations:
         console.problem(f"{BAD} {deviation.text()}.")
     if not deviations:
-        console.say(f"{GOOD} {len(sessions)} sessions: every kept trial is unchanged.")
+        checked = counted(len(sessions), "session")
+        console.say(f"{GOOD} {checked}: every kept trial is unchanged.")
     return _NOT_AS_KEPT if deviations else 0
 
 

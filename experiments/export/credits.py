@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from acquisition.errors import SettingsError
+from acquisition.wording import counted
 
 _ORCID = re.compile(r"(\d{4}-){3}\d{3}[\dX]")
 _AUTHOR = re.compile(r"(?P<name>[^<>]+?)\s*(<(?P<orcid>[^<>]+)>)?")
@@ -234,7 +235,7 @@ def readme_text(about: Credits, terrains: Sequence[str], trials: int) -> str:
 
 {about.description}
 
-{authors}, {about.date}. {trials} trials on {", ".join(terrains)}.
+{authors}, {about.date}. {counted(trials, "trial")} on {", ".join(terrains)}.
 
 | file | content |
 |---|---|

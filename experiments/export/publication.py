@@ -14,6 +14,7 @@ from acquisition.clock import SystemClock
 from acquisition.extras import require_extra
 from acquisition.formats import FORMAT
 from acquisition.trial_file.data_files import list_folder, open_data
+from acquisition.wording import counted
 from analysis.data.load import RecordedTrial, load_trial
 from experiments import provenance
 from experiments.export.checksums import SUMS, write_sums
@@ -211,7 +212,9 @@ def _environment(code: Mapping[str, str]) -> str:
 
 def _say(to: Path, trials: Collection[RecordedTrial], console: Console) -> None:
     names = sorted({t.metadata["trial"].get("operator", "") for t in trials} - {""})
-    console.say(f"{len(trials)} trials published in {to}; checksums in {SUMS}.")
+    console.say(
+        f"{counted(len(trials), 'trial')} published in {to}; checksums in {SUMS}."
+    )
     if names:
         console.say(
             f"{WARNING} The recordings name who pushed: {', '.join(names)}. Do they "

@@ -15,6 +15,7 @@ from acquisition.errors import SessionError, SettingsError
 from acquisition.trial_file.bag import BagMessage, bag_bytes
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.views import VIEW_TOPICS, encode_views
+from acquisition.wording import counted
 from analysis.data.load import sensor_height_of
 from experiments.export.checksums import SUMS, digest_of, write_sums
 from experiments.operator.console import WARNING, Console
@@ -60,7 +61,7 @@ def export_standard_topics(
     if any(session.is_simulated for session, _ in paths):
         console.say(f"{WARNING} SIMULATED: metadata `{RECORDING}` of every file says.")
     check = f"cd {to} && sha256sum -c {SUMS}"
-    console.say(f"{len(paths)} trials in {to}. To check: {check}")
+    console.say(f"{counted(len(paths), 'trial')} in {to}. To check: {check}")
 
 
 def standard_topics(trial: TrialReader) -> bytes:

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from acquisition.clock import SystemClock
+from acquisition.wording import counted
 from analysis.study.models import GP_SE, GP_SE_TRIAL, PAPER_MODELS, FitOptions
 from analysis.terrains.identify import identify_study
 from analysis.terrains.tabulation import database_of
@@ -43,4 +44,4 @@ def export_terrains(
         store=results_below(data),
     )
     write_new_text(out, text)
-    console.say(f"{len(study.terrains)} terrains: {out}")
+    console.say(f"{counted(len(study.terrains), 'terrain')}: {out}")

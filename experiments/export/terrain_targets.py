@@ -6,6 +6,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from acquisition.files import read_regular
+from acquisition.wording import counted
 from analysis.terrains.database import LARGEST, load
 from analysis.terrains.export.exported import TerrainExport
 from analysis.terrains.export.folder import require_target, target_files
@@ -62,6 +63,6 @@ def export_for(request: TargetRequest, console: Console) -> None:
             file = request.to / name / path
             file.parent.mkdir(parents=True, exist_ok=True)
             write_new(file, data)
-        console.say(f"{name:10} {request.to / name}: {len(files)} files")
+        console.say(f"{name:10} {request.to / name}: {counted(len(files), 'file')}")
     if export.is_simulated:
         console.say(f"{WARNING} SIMULATED trials: every file says so.")

@@ -8,6 +8,7 @@ from typing import Any
 from acquisition.clock import SystemClock
 from acquisition.errors import SessionError
 from acquisition.formats import FORMAT
+from acquisition.wording import counted
 from analysis.data.load import RecordedTrial, load_trial
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.recorded_factors import FOOT, StatedFactors, value_text
@@ -205,7 +206,8 @@ def export_sessions(
     writer.finish(what, "SIMULATED trials." if is_simulated else "Recorded trials.")
     if is_simulated:
         console.say(f"{WARNING} SIMULATED: trials.csv says so in every row.")
-    console.say(f"{len(rows)} trials in {to}. To check: cd {to} && sha256sum -c {SUMS}")
+    trials = counted(len(rows), "trial")
+    console.say(f"{trials} in {to}. To check: cd {to} && sha256sum -c {SUMS}")
 
 
 def _factor_columns(stated: Sequence[StatedFactors]) -> dict[str, str]:

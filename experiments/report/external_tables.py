@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.errors import SettingsError
+from acquisition.wording import counted
 from analysis.data.series import TractionSeries
 from analysis.logs.record import ImportRecord, read_record
 from analysis.report.sections.imported import import_tables
@@ -60,7 +61,9 @@ def report_tables_of_trials(
     for note in notes:  # before the work: a wrong unit shows here
         console.say(f"{WARNING} {note}")
     count = sum(len(series) for series in trials.values())
-    console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
+    console.say(
+        f"{counted(count, 'trial')} on {counted(len(trials), 'terrain')}: fitting ..."
+    )
     options = StudyOptions(
         request.choices.prepare, fit=request.fit, scheduler=request.scheduler
     )
@@ -70,7 +73,7 @@ def report_tables_of_trials(
     reported = ReportedStudy(
         study,
         title="Traction from external data",
-        subtitle=f"{count} trials from {len(files)} files",
+        subtitle=f"{counted(count, 'trial')} from {counted(len(files), 'file')}",
         is_foreign=True,
         trials=trials,
         with_columns=with_columns,

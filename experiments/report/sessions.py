@@ -6,6 +6,7 @@ from pathlib import Path
 from shutil import disk_usage
 
 from acquisition.errors import SessionError, TrialFileError
+from acquisition.wording import counted
 from analysis.data.load import load_trial
 from analysis.data.plausibility import doubt_summary
 from analysis.data.recorded_factors import stated_factors
@@ -125,7 +126,9 @@ def study_sessions(
         ids = ", ".join(s.id for s in sessions)
         raise SessionError(f"{ids}: no kept trials to report.")
     trials = {name: trials[name] for name in request.sorted(trials)}
-    console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
+    console.say(
+        f"{counted(count, 'trial')} on {counted(len(trials), 'terrain')}: fitting ..."
+    )
     travel = min(t.frame.travel for group in trials.values() for t in group)
     options = StudyOptions(
         prepare=replace(request.choices.prepare, container_travel=travel),
@@ -191,7 +194,7 @@ def _reported(
     return ReportedStudy(
         study,
         title="Traction " + (sessions[0].id if len(sessions) == 1 else "study"),
-        subtitle=f"{len(every)} trials on {', '.join(trials)}",
+        subtitle=f"{counted(len(every), 'trial')} on {', '.join(trials)}",
         is_foreign=False,
         trials=analysed.files,
         with_columns=recorded_columns(analysed.files, request.covariates),

@@ -11,6 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from acquisition.clock import SystemClock
 from acquisition.errors import SessionError, SettingsError
+from acquisition.wording import counted
 from experiments.arguments import PACES, TimeMode, requested_time_mode
 from experiments.messages import CATALOGUE
 from experiments.operator.console import WARNING, Console
@@ -190,7 +191,9 @@ def close(folder: SessionFolder, reason: str, console: Console) -> None:
             journal.append(Event.ENDED, reason="complete")
         else:
             journal.append(Event.GIVEN_UP, reason=reason)
-    console.say(f"{folder.id} is closed with {len(journal.state.kept)} kept trials.")
+    console.say(
+        f"{folder.id} is closed with {counted(len(journal.state.kept), 'kept trial')}."
+    )
 
 
 def _recovered(folder: SessionFolder, console: Console) -> Journal:

@@ -57,7 +57,7 @@ def test_a_row_without_its_input_is_dropped_and_named(tmp_path):
     first = load(path)["a"][0]
     assert first.dropped_rows == 1
     assert first.further["angle"].size == first.t.size == 39
-    assert "1 rows without a value of an input dropped" in first.notes
+    assert "1 row without a value of an input dropped" in first.notes
 
 
 def test_inputs_follow_their_rows_through_preparation_folds_and_choices():
