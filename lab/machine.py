@@ -64,6 +64,8 @@ def command(kernel: Kernel, initramfs: Path, sockets: Sockets, proxy: int) -> li
         "-bios qboot.rom"
     )
     return [
+        # a machine would go on for ever after this process was killed
+        *(program("setpriv"), "--pdeathsig", "KILL"),
         program("qemu-system-x86_64"),
         *options.split(),
         *_memory(),

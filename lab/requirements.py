@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 
 PROGRAMS: Mapping[str, str] = {
     "qemu-system-x86_64": "qemu-system-x86",
+    "setpriv": "util-linux",
     "busybox": "busybox-static",
     "modprobe": "kmod",
     "depmod": "kmod",
