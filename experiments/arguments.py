@@ -267,6 +267,36 @@ def add_time_options(parser: ArgumentParser) -> None:
     )
 
 
+_SIMULATED = (  # options of a simulation
+    "fast",
+    "processes",
+    "fault",
+    "operator_script",
+    "friction",
+    "cables",
+    "mount",
+    "wrong",
+)
+
+
+def refuse_simulated_options(args: Namespace) -> None:
+    """Refuse options of a simulation for a real rig, which they would not keep away.
+
+    Raises:
+        SettingsError: one was given without --fake.
+    """
+    from acquisition.errors import SettingsError
+
+    given = [f"--{name}" for name in _SIMULATED if getattr(args, name, None)]
+    if args.fake or not given:
+        return
+    names = " and ".join(given).replace("_", "-")
+    work = "works" if len(given) == 1 else "work"
+    raise SettingsError(
+        f"{names} {work} only with --fake.", hint="Nothing was started."
+    )
+
+
 def requested_time_mode(args: Namespace) -> TimeMode | None:
     """Return the requested time mode of a simulation; None if not given."""
     if args.fast:

@@ -10,7 +10,7 @@ from experiments.arguments import (
     friction_share,
     requested_time_mode,
 )
-from experiments.rig.deviation_options import add_truth, check_truth, mount_of
+from experiments.rig.deviation_options import add_truth, mount_of
 
 if TYPE_CHECKING:
     import argparse
@@ -27,22 +27,6 @@ def add_arm(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--operator-script", metavar="auto", help="simulated operator, only with --fake"
     )
-
-
-def check_arm(args: argparse.Namespace) -> None:
-    """Refuse options of a simulated arm on a real one.
-
-    Raises:
-        SettingsError: such an option was given.
-    """
-    from acquisition.errors import SettingsError
-
-    if not args.fake and (requested_time_mode(args) or args.operator_script):
-        raise SettingsError(
-            "--fast, --processes and --operator-script work only with --fake.",
-            hint="Nothing was started.",
-        )
-    check_truth(args)
 
 
 def fake_options(

@@ -62,16 +62,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Guide through one calibration and write its file; returns the exit code."""
+    from experiments.arguments import refuse_simulated_options
     from experiments.calibration.calibration import CalibrationContext, calibrate
     from experiments.calibration.guiding import check_new, guide_person
     from experiments.calibration.kinds import CALIBRATIONS
-    from experiments.calibration.options import check_arm
     from experiments.calibration.pose_file import read_poses
     from experiments.settings.load import load_settings
 
     calibration, count = CALIBRATIONS[args.what], args.poses
     fewest = calibration.fewest_poses
-    check_arm(args)
+    refuse_simulated_options(args)
     _check_count(count, fewest)
     friction_share(args)
     settings = load_settings(args.config)

@@ -11,9 +11,10 @@ from experiments.arguments import (
     add_time_options,
     did_you_mean,
     number_within,
+    refuse_simulated_options,
     requested_time_mode,
 )
-from experiments.rig.deviation_options import add_truth, check_truth, mount_of
+from experiments.rig.deviation_options import add_truth, mount_of
 
 if TYPE_CHECKING:
     from experiments.operator.console import Console
@@ -79,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
         )
     if args.explain:
         return _explain(args.explain, console)
-    check_truth(args)
+    refuse_simulated_options(args)
     settings = load_settings(args.config)
     if args.config_only:
         read_law_calibrations(settings)

@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import friction_share
-from experiments.calibration.options import add_arm, check_arm, fake_options
+from experiments.arguments import friction_share, refuse_simulated_options
+from experiments.calibration.options import add_arm, fake_options
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
     from experiments.operator.scripted import choose_operator
     from experiments.settings.load import load_settings
 
-    check_arm(args)
+    refuse_simulated_options(args)
     steps = _steps(args)
     friction_share(args)
     settings = load_settings(args.config)

@@ -9,9 +9,10 @@ from experiments.arguments import (
     add_recording_options,
     data_option,
     friction_share,
+    refuse_simulated_options,
     requested_time_mode,
 )
-from experiments.rig.deviation_options import add_truth, check_truth, mount_of
+from experiments.rig.deviation_options import add_truth, mount_of
 
 if TYPE_CHECKING:
     from experiments.run.resume import ResumeRequest
@@ -120,14 +121,7 @@ def _check_arguments(args: argparse.Namespace) -> None:
     from acquisition.errors import SettingsError
 
     nothing = "Nothing was started."
-    time = requested_time_mode(args)
-    simulated = (time, args.fault, args.operator_script)
-    if not args.fake and any(simulated):
-        raise SettingsError(
-            "--fast, --processes, --fault and --operator-script work only with --fake.",
-            hint=nothing,
-        )
-    check_truth(args)
+    refuse_simulated_options(args)
     if args.trials is not None and not 1 <= args.trials <= 99:
         raise SettingsError(
             f"--trials {args.trials} - expected a whole number 1..99, e.g. 10.",

@@ -38,13 +38,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Guide through the touches and write the place; returns the exit code."""
     from acquisition.errors import SettingsError
+    from experiments.arguments import refuse_simulated_options
     from experiments.calibration.calibration import CalibrationContext, calibrate
     from experiments.calibration.guiding import check_new, guide_person
-    from experiments.calibration.options import check_arm
     from experiments.calibration.taught_place import place_calibration
     from experiments.settings.load import load_untaught
 
-    check_arm(args)
+    refuse_simulated_options(args)
     friction_share(args)
     if not _PLACE.fullmatch(args.place):
         raise SettingsError(

@@ -69,20 +69,6 @@ def add_truth(parser: ArgumentParser) -> None:
     )
 
 
-def check_truth(args: Namespace) -> None:
-    """Refuse these options on a real rig.
-
-    Raises:
-        SettingsError: --mount or --wrong without --fake.
-    """
-    from acquisition.errors import SettingsError
-
-    if (args.wrong or args.mount) and not args.fake:
-        raise SettingsError(
-            "--mount and --wrong work only with --fake.", hint="Nothing was started."
-        )
-
-
 def mount_of(args: Namespace) -> tuple[float, float, float] | None:
     """Return the rotations of the base [degrees]; None = as in the settings."""
     if args.mount is None:

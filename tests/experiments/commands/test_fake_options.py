@@ -5,7 +5,7 @@ import pytest
 from experiments.calibration.kinds import CALIBRATIONS
 from experiments.commands.calibrate import KINDS
 from fakes.serving import home_arm
-from tests.experiments.program import traction
+from tests.experiments.program import served_config, traction
 
 FOOT = """\
 mass = 0.3
@@ -160,14 +160,34 @@ def test_help_on_wrong_rigs_lists_them():
     assert "sensor-scale-95" in done.out
 
 
-@pytest.mark.parametrize(
-    "option", [("--wrong", "pidx-3-is-2"), ("--mount", "1", "2", "3")]
-)
-@pytest.mark.parametrize("command", [("run", "S0"), ("check",), ("calibrate", "foot")])
-def test_a_real_rig_cannot_be_made_wrong(command, option):
-    done = traction(*command, *option)
+ARM_COMMANDS = [
+    ("run", "S0"),
+    ("check",),
+    ("calibrate", "foot"),
+    ("teach", "bay2"),
+    ("commission",),
+    ("bench",),
+    ("zero",),
+]
+SIMULATED = [
+    ("--fast",),
+    ("--processes",),
+    ("--fault", "estop"),
+    ("--operator-script", "auto"),
+    ("--friction", "1"),
+    ("--cables", "15"),
+    ("--wrong", "pidx-3-is-2"),
+    ("--mount", "1", "2", "3"),
+]
+
+
+@pytest.mark.parametrize("option", SIMULATED, ids=lambda words: words[0])
+@pytest.mark.parametrize("command", ARM_COMMANDS, ids=lambda words: words[0])
+def test_an_option_of_simulations_never_reaches_a_real_rig(command, option, tmp_path):
+    config = served_config(tmp_path)  # of a bus that nobody serves
+    done = traction(*command, *option, "--config", config)
     assert done.code == 2
-    assert "work only with --fake" in done.err
+    assert "only with --fake" in done.err or "unrecognized arguments" in done.err
 
 
 def test_a_mount_angle_out_of_range_is_refused():
