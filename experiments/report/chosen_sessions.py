@@ -6,7 +6,7 @@ from pathlib import Path
 from acquisition.errors import SessionError
 from experiments.messages import CATALOGUE
 from experiments.operator.console import WARNING, Console
-from experiments.session.kept_files import check_kept
+from experiments.session.kept_files import check_kept, journal_deviations
 from experiments.session.reducer import replay
 from experiments.session.store import SessionFolder, find_session, list_sessions
 
@@ -23,7 +23,7 @@ def choose_sessions(
         hint = "For example: traction report S012"
         raise SessionError("Name the sessions to report, or use --all.", hint=hint)
     if every:
-        sessions = [s for s in list_sessions(data) if replay(s.events()).kept]
+        sessions = [s for s in list_sessions(data) if _counts(s)]
     else:
         sessions = [find_session(data, name) for name in dict.fromkeys(names)]
     if not sessions:
@@ -35,6 +35,11 @@ def choose_sessions(
         what, hint = (t.format_map(values) for t in (message.what, message.do))
         raise SessionError(what, hint=hint)
     return sessions
+
+
+def _counts(session: SessionFolder) -> bool:
+    """Whether a session has kept trials, or had some before its journal was damaged."""
+    return bool(journal_deviations(session) or replay(session.events()).kept)
 
 
 def report_missing(

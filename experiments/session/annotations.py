@@ -12,6 +12,7 @@ from experiments.session.crash_recovery import recover_session
 from experiments.session.data_files import sha256_of
 from experiments.session.derivation import sidecar_of
 from experiments.session.journal import Journal, open_journal
+from experiments.session.kept_files import require_sound_journal
 from experiments.session.lock import session_lock
 from experiments.session.reducer import refusal
 from experiments.session.sidecar import KEEP, TrialName
@@ -111,7 +112,11 @@ def change_verdict(
                 f"{trial} of {folder.id} cannot get this verdict: {refused}.",
                 hint="Nothing was changed.",
             )
-        remarks = _check_file(journal, name) if verdict == KEEP else []
+        if verdict == KEEP:
+            remarks = _check_file(journal, name)
+        else:
+            lost = _lost_file(journal, name)
+            remarks = [f"{WARNING} {lost}"] if lost else []
         journal.append(Event.VERDICT, **fields)
         path = journal.state.attempt_at(name).relative_stem
         kept, wanted = len(journal.state.kept), journal.state.wanted
@@ -144,6 +149,7 @@ def trial_path(folder: SessionFolder, trial: str) -> Path:
 
 
 def _journal(folder: SessionFolder) -> Journal:
+    require_sound_journal(folder)
     journal = open_journal(folder, SystemClock())
     recover_session(journal)
     return journal
@@ -180,15 +186,20 @@ def _check_file(journal: Journal, name: TrialName) -> list[str]:
     Raises:
         SessionError: its file is missing or changed.
     """
-    attempt = journal.state.attempt_at(name)
-    sidecar = sidecar_of(journal.folder, attempt)
-    path = journal.folder.path / f"{attempt.relative_stem}.mcap"
-    if not is_there(path) or sha256_of(path) != sidecar.get("sha256"):
-        raise SessionError(
-            f"{path.name} is missing or is not what was recorded.",
-            hint="It cannot count. Nothing was changed.",
-        )
+    if lost := _lost_file(journal, name):
+        raise SessionError(lost, hint="It cannot count. Nothing was changed.")
+    sidecar = sidecar_of(journal.folder, journal.state.attempt_at(name))
     status = sidecar.get("status")
     if status == "complete":
         return []
     return [f"{WARNING} {name.rejected} is {status}: {sidecar.get('stop_reason')}."]
+
+
+def _lost_file(journal: Journal, name: TrialName) -> str:
+    """Return what is wrong with the file of a trial; "" if it is as recorded."""
+    attempt = journal.state.attempt_at(name)
+    sidecar = sidecar_of(journal.folder, attempt)
+    path = journal.folder.path / f"{attempt.relative_stem}.mcap"
+    if is_there(path) and sha256_of(path) == sidecar.get("sha256"):
+        return ""
+    return f"{path.name} is missing or is not what was recorded."

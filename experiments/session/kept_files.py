@@ -70,6 +70,34 @@ def compare_kept(
         return [unreadable(folder, error)]
 
 
+def journal_deviations(folder: SessionFolder) -> list[Deviation]:
+    """Return where the journal is damaged or lags behind the files derived from it.
+
+    Nothing may be derived from such a journal: what it has lost would be rejected, and
+    what shows the loss overwritten.
+    """
+    try:
+        content = folder.journal()
+        pairs = [*_journal_faults(folder, content), *_unknown_sidecars(folder, content)]
+        return [Deviation(folder.id, *pair) for pair in pairs]
+    except TrialFileError as error:
+        return [unreadable(folder, error)]
+
+
+def require_sound_journal(folder: SessionFolder) -> None:
+    """Refuse to write to a session whose journal is damaged or lags behind.
+
+    Raises:
+        KeptDataError: there are `journal_deviations`.
+    """
+    if deviations := journal_deviations(folder):
+        raise kept_data_error(
+            deviations,
+            "Copy the files back, or go on without them: "
+            f"traction resume {folder.id} --allow-missing. Nothing was written.",
+        )
+
+
 def _compare(
     folder: SessionFolder, journal: JournalContent, digest: Callable[[Path], str]
 ) -> list[tuple[str, str]]:
@@ -78,28 +106,51 @@ def _compare(
     Raises:
         TrialFileError: a folder cannot be read.
     """
-    state = journal.state
-    faults = [(JOURNAL_FILE, fault) for fault in journal.faults]
-    if (deviation := name_contradiction(folder, journal.events)) is not None:
-        faults.append((deviation.file, deviation.problem))
-    judged = {attempt.name for attempt in state.attempts if attempt.verdicts}
-    faults += _unknown_to_journal(folder, journal.text, {n.kept for n in judged})
-    for attempt in state.kept_trials:
+    faults = _journal_faults(folder, journal)
+    for attempt in journal.state.kept_trials:
         try:
             faults += _check_trial(folder, attempt, digest)
         except TrialFileError as error:
             faults.append((_relative_path(folder, error), error.reason))
+    for file, problem in _unknown_sidecars(folder, journal):
+        faults.append((file, problem))
+        fields = read_json(folder.path / file)
+        stem, attempt = Path(file).stem, fields.get("attempt")
+        attempt = attempt if type(attempt) is int else 1
+        name = TrialName(int(stem[1:]), attempt) if stem[1:].isdigit() else None
+        if name is not None:  # only the sidecar has the checksum
+            orphan = Attempt(name, sums=checksum_and_size(fields))
+            faults += _check_trial(folder, orphan, digest)
+    return faults
+
+
+def _judged(journal: JournalContent) -> set[TrialName]:
+    return {a.name for a in journal.state.attempts if a.verdicts}
+
+
+def _journal_faults(
+    folder: SessionFolder, journal: JournalContent
+) -> list[tuple[str, str]]:
+    """Return (file, problem) where the journal is damaged or contradicts the folder."""
+    faults = [(JOURNAL_FILE, fault) for fault in journal.faults]
+    if (deviation := name_contradiction(folder, journal.events)) is not None:
+        faults.append((deviation.file, deviation.problem))
+    judged = {name.kept for name in _judged(journal)}
+    return faults + _unknown_to_journal(folder, journal.text, judged)
+
+
+def _unknown_sidecars(
+    folder: SessionFolder, journal: JournalContent
+) -> list[tuple[str, str]]:
+    """Return (file, problem) of the sidecars of kept trials without a verdict."""
+    judged = _judged(journal)
+    faults: list[tuple[str, str]] = []
     for path in list_folder(folder.trials, "T??.json"):
         fields = read_json(path)
-        stem, attempt = path.stem, fields.get("attempt")
-        is_judged = any(d.kept == stem and d.attempt == attempt for d in judged)
+        attempt = fields.get("attempt")
+        is_judged = any(n.kept == path.stem and n.attempt == attempt for n in judged)
         if fields.get("verdict") == KEEP and not is_judged:
             faults.append((f"trials/{path.name}", "is kept, but is not in the journal"))
-            attempt = attempt if type(attempt) is int else 1
-            name = TrialName(int(stem[1:]), attempt) if stem[1:].isdigit() else None
-            if name is not None:  # only the sidecar has the checksum
-                orphan = Attempt(name, sums=checksum_and_size(fields))
-                faults += _check_trial(folder, orphan, digest)
     return faults
 
 
@@ -223,14 +274,14 @@ def check_kept(
     return deviations
 
 
-def kept_data_error(deviations: Sequence[Deviation]) -> KeptDataError:
+def kept_data_error(
+    deviations: Sequence[Deviation],
+    hint: str = "Copy the files back, or go on without them: --allow-missing.",
+) -> KeptDataError:
     """Return the error for data that contradict the journal."""
     named = "; ".join(d.text() for d in deviations[:_NAMED])
     more = f"; and {len(deviations) - _NAMED} more" if deviations[_NAMED:] else ""
-    return KeptDataError(
-        f"Not as in the journal: {named}{more}.",
-        hint="Copy the files back, or go on without them: --allow-missing.",
-    )
+    return KeptDataError(f"Not as in the journal: {named}{more}.", hint=hint)
 
 
 def _check_trial(
