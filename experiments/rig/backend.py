@@ -9,6 +9,7 @@ from acquisition.control_loop.loop import Loop
 from acquisition.control_loop.realtime import GrantResult
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
+from acquisition.errors import TrialFileError
 from acquisition.ipc.layout import SharedLayout
 from acquisition.ipc.loop_client import LoopClient
 from acquisition.ipc.requests import Answer, Dispatcher, Request
@@ -50,6 +51,11 @@ class RigBackend(Protocol):
         """Start the loop."""
         ...
 
+    @property
+    def is_controlled(self) -> bool:
+        """Whether the loop runs, and with it the control of the arm."""
+        ...
+
     def grants(self) -> dict[str, list[GrantResult]]:
         """Return the scheduling rights granted to each process."""
         ...
@@ -81,20 +87,27 @@ class InlineLoop:
         self._loop = loop
         self._recorder = recorder
         self._passed = 0
+        self._raised: TrialFileError | None = None
 
     def step(self) -> None:
         """Run one cycle, even if the recorder has failed."""
         self._loop.step()
 
     def __call__(self, cycles: int) -> None:
-        """Run the loop for `cycles` periods; drain the recorder when due."""
+        """Run the loop for `cycles` periods; drain the recorder when due.
+
+        Raises:
+            TrialFileError: the recorder has failed; once, the arm is still to be held.
+        """
         self._loop.run(cycles)
         self._passed += cycles
         if self._passed >= _DRAIN_CYCLES:
             self._passed = 0
             self._recorder.drain()
-        if self._recorder.failure is not None:
-            raise self._recorder.failure
+        failure = self._recorder.failure
+        if failure is not None and failure is not self._raised:
+            self._raised = failure
+            raise failure
 
 
 class InProcessBackend:
@@ -130,6 +143,11 @@ class InProcessBackend:
         loop = Loop(loop_server, self._clock, stats=loop_server.stats)
         self._advance_loop = InlineLoop(loop, self.recorder)
         self.loop_client.beat()
+
+    @property
+    def is_controlled(self) -> bool:
+        """Whether the loop runs, and with it the control of the arm."""
+        return self._advance_loop is not None
 
     def grants(self) -> dict[str, list[GrantResult]]:
         """Return no grants: this thread requests none."""

@@ -142,6 +142,11 @@ class MultiProcessBackend:
         return grants
 
     @property
+    def is_controlled(self) -> bool:
+        """Whether the loop runs, and with it the control of the arm."""
+        return self._control.is_alive and self.loop_client.loop.is_running
+
+    @property
     def bus_path(self) -> str:
         """Path of the served bus of a simulated rig."""
         return str(self._jobs.control["can"]["channel"])

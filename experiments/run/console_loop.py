@@ -99,6 +99,8 @@ class ConsoleLoop:
     _reported: set[Fault | None] = field(  # faults that persist
         default_factory=set[Fault | None], init=False
     )
+    # strictest verdict that was raised and not cleared
+    _standing: GuardVerdict | None = field(default=None, init=False)
 
     @property
     def loop_client(self) -> LoopClient:
@@ -230,6 +232,9 @@ class ConsoleLoop:
             self._print_fault(verdict)
         self._reported.add(strictest.fault)
         self.loop_client.note(control)
+        standing = self._standing
+        if standing is None or strictest.strictness > standing.strictness:
+            self._standing = strictest
         return ArmFaultError(strictest)
 
     def _print_fault(self, verdict: GuardVerdict) -> None:
@@ -260,6 +265,28 @@ class ConsoleLoop:
         """Inject the planned faults that are due in trial `number`."""
         if self.faults is not None:
             self.faults.inject_due(moment, number, seconds)
+
+    def standing_verdict(self) -> GuardVerdict | None:
+        """Return the strictest verdict that was not cleared; None = the arm is sound.
+
+        Includes one that another error prevented from being reported.
+        """
+        with suppress(TractionError):  # no more control of the arm
+            self.loop_client.advance(TICK)
+            control = self.loop_client.status
+            if self.loop_client.is_news(control):
+                self._report_faults(control)
+        return self._standing
+
+    @property
+    def is_carrying(self) -> bool:
+        """Whether the motors carry the arm."""
+        backend = self.rig.backend
+        return (
+            backend.is_controlled
+            and self.loop_client.status.state in _DRIVEN
+            and backend.safety_mode() not in SHORTED
+        )
 
     def worst_verdict(self, verdict: GuardVerdict) -> GuardVerdict:
         """Return the stricter of `verdict` and the guard's strictest active one.
@@ -297,6 +324,7 @@ class ConsoleLoop:
                 pass
         self.loop_client.request(ArmState.HOLD)
         self.loop_client.advance(0.1)
+        self._standing = None
 
     def run_in_background(self, work: Callable[[], _T]) -> _T:
         """Run slow `work` in a thread while the console keeps its heartbeat.
@@ -335,9 +363,7 @@ class ConsoleLoop:
         request at once.
         """
         loop_client = self.loop_client
-        is_driven = loop_client.status.state in _DRIVEN
-        is_shorted = self.rig.backend.safety_mode() in SHORTED
-        if not is_driven or is_shorted or self.console.is_lost:
+        if not self.is_carrying or self.console.is_lost:
             return
         self.show(None)
         if self.stop.is_urgent:
@@ -349,6 +375,8 @@ class ConsoleLoop:
             if loop_client.status.state in {ArmState.FLOAT, ArmState.GUIDE}:
                 loop_client.request(ArmState.HOLD)
             loop_client.advance(_SETTLE_SECONDS)
+            if not self.is_carrying:  # a fault that stands has become worse
+                return
             if loop_client.status.state is ArmState.DAMP:
                 self.console.say(_DAMPED)
                 if not self._await_confirmation(Prompt.DAMPED, lambda: True):
@@ -365,7 +393,10 @@ class ConsoleLoop:
             return  # no control of the arm: it is idled at once
 
     def _await_confirmation(self, prompt: Prompt, is_done: Callable[[], bool]) -> bool:
-        """Return whether the operator confirms in time and `is_done` holds."""
+        """Return whether the operator confirms in time and `is_done` holds.
+
+        Nothing is left to confirm once the motors no longer carry the arm.
+        """
         requests = self.stop.count
         for _ in range(round(LAY_DOWN_SECONDS / TICK)):
             state = self._advance(prompt, None)
@@ -373,7 +404,7 @@ class ConsoleLoop:
             if key_action(prompt, key) is KeyAction.CONFIRM and is_done():
                 return True
             is_stopped = self.stop.count > requests or self.stop.is_urgent
-            if is_stopped or self.console.is_lost:
+            if is_stopped or self.console.is_lost or not self.is_carrying:
                 return False
         self.console.say(_NO_ANSWER)
         return False
@@ -397,8 +428,8 @@ class ConsoleLoop:
     def make_safe(self) -> bool:
         """Idle the arm and abandon an open file; returns whether idle is confirmed.
 
-        Faults that the loop detects meanwhile are printed, e.g. a puck that missed the
-        command.
+        Other faults that the loop detects meanwhile are printed, e.g. a puck that
+        missed the command.
         """
         backend = self.rig.backend
         is_confirmed = backend.idle()  # first: a recorder may not answer
@@ -410,7 +441,9 @@ class ConsoleLoop:
             return is_confirmed
         with suppress(TractionError):
             self.loop_client.advance(TICK)
-            control = self.loop_client.status
+            control, told = self.loop_client.status, self._standing
             if self.loop_client.is_news(control):
-                self.console.problem(fault_words(self._report_faults(control).verdict))
+                verdict = self._report_faults(control).verdict
+                if told is None or verdict.fault is not told.fault:
+                    self.console.problem(fault_words(verdict))
         return is_confirmed

@@ -114,6 +114,9 @@ def record_trial(context: RunContext, name: TrialName) -> TrialOutcome:
             _end(context, name, header, outcome)
         raise
     except TrialFileError as error:
+        context.loop_client.watch_trial(is_recording=False)
+        if context.console_loop.standing_verdict() is None:
+            context.loop_client.request(ArmState.HOLD)
         raise _lost("disk-lost", context, name, error) from error
     context.loop_client.request(ArmState.HOLD)
     _end(context, name, header, outcome)
@@ -247,8 +250,7 @@ def _friction_lines(devices: Mapping[str, str]) -> list[str]:
 def _lost(
     message: str, context: RunContext, name: TrialName, error: TrialFileError
 ) -> TrialLostError:
-    """Hold the arm; returns the error for a trial that could not be written."""
-    context.loop_client.request(ArmState.HOLD)
+    """Return the error for a trial that could not be written."""
     seconds = context.state.fault_context.seconds
     details = {
         "trial": name.kept,

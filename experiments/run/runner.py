@@ -21,6 +21,10 @@ from experiments.session.sidecar import TrialName
 from experiments.session.states import Event
 
 FAULTS_IN_A_ROW = 5  # end the session
+_FAULT_CODE = 4  # exit code of a fault of the arm
+# the arm at an error that is not of the arm
+_HOLDING = "holding; support it before it goes idle"
+_UNCONTROLLED = "not under control; support it now"
 
 
 class SessionRunner:
@@ -58,14 +62,13 @@ class SessionRunner:
                 CATALOGUE["interrupted"].text({}, context.journal.saved_message())
             )
         except ArmFaultError as fault:
-            code, reason = 4, fault.verdict.reason
+            code, reason = _FAULT_CODE, fault.verdict.reason
             context.state.fault_context = replace(
                 context.state.fault_context, prompt=None
             )
             context.report_fault(fault.verdict)
         except TractionError as error:
-            code, reason = error.exit_code, "error"
-            context.report_error(error)
+            code, reason = self._report_failure(error), "error"
         except Exception:  # the arm first, then the message, the traceback to the log
             self._report_bug(self._make_safe(), traceback.format_exc())
         finally:
@@ -129,6 +132,32 @@ class SessionRunner:
         context.close_undo()
         outcome = record_trial(context, name)
         ask_verdict(context, name, outcome)
+
+    def _report_failure(self, error: TractionError) -> int:
+        """Report an error that ends the session, and a fault that stands besides.
+
+        What the fault does to the arm stands, not what the error alone would do.
+        Returns the exit code.
+        """
+        context = self._context
+        verdict = context.console_loop.standing_verdict()
+        if verdict is None:
+            if not error.arm_state:
+                error.arm_state = self._arm_state()
+            context.report_error(error)
+            return error.exit_code
+        error.arm_state = ""
+        context.console.problem(str(error))
+        context.state.fault_context = replace(context.state.fault_context, prompt=None)
+        context.report_fault(verdict)
+        return _FAULT_CODE if verdict.ends_session else error.exit_code
+
+    def _arm_state(self) -> str:
+        """Return what the arm does at an error that is not of the arm; "" if idle."""
+        context = self._context
+        if not context.rig.backend.is_controlled:
+            return _UNCONTROLLED
+        return _HOLDING if context.console_loop.is_carrying else ""
 
     def _make_safe(self) -> str:
         """Idle the arm; returns its state as text; safe to repeat."""
