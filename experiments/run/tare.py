@@ -12,7 +12,7 @@ from acquisition.control_loop.states import ArmState
 from acquisition.devices import WrenchSample
 from acquisition.errors import PreflightError, TractionError
 from acquisition.ipc.shared_sensor import unpack_wrenches
-from analysis.data.plausibility import zero_doubts
+from analysis.data.plausibility import Doubt, zero_doubts
 from experiments.messages import CATALOGUE, preflight_error, weight_words
 from experiments.operator.console import GOOD, WARNING
 from experiments.operator.prompts import Prompt
@@ -22,6 +22,7 @@ from experiments.run.context import RunContext, RunServices
 from experiments.run.fault_plan import FaultTrigger
 from experiments.run.pose_walk import PoseWalk
 from experiments.run.stop import ArmFaultError, StopRequestedError
+from experiments.session.reducer import SessionState
 from experiments.session.sidecar import TrialName
 from experiments.session.states import Event
 from experiments.settings.calibrations import PREFIX
@@ -38,6 +39,7 @@ STILL_SECONDS = 0.3
 STILL_SPEED = 0.01  # m/s
 LIFTED = 0.03  # height above the plane from which the foot counts as lifted [m]
 MAX_TARES = 5  # attempts
+_NOTED_BY = "tare"  # author of a note
 
 
 def take_tare(context: RunContext, name: TrialName) -> None:
@@ -202,11 +204,15 @@ def _accept(context: RunContext, name: TrialName, result: TareResult) -> None:
     position = context.loop_client.latest()["position"][0]
     rotation = rig.model.sole_pose(position)[1]
     tared = rig.payload.tared(np.array(result.wrench), rotation)
-    _check_residual(rig, tared, rotation)
+    try:
+        _check_residual(rig, tared, rotation)
+    except PreflightError:
+        _note_zero(context, tared)
+        raise
     rig.tared, rig.tared_ns = tared, result.t_ns
     bias = tared.bias.tolist()
     context.loop_client.set_bias(bias)
-    before = context.journal.state
+    doubts = _zero_doubts(context.journal.state, tared)
     context.append(
         Event.TARED,
         trial_number=name.number,
@@ -214,10 +220,31 @@ def _accept(context: RunContext, name: TrialName, result: TareResult) -> None:
         bias=bias,
         spread=round(float(result.spread), 3),
     )
-    if before.untared is not None and before.last_bias:
-        change = tared.bias[:3] - np.array(before.last_bias[:3])
-        for doubt in zero_doubts(float(np.linalg.norm(change))):
-            context.say(f"{WARNING} {before.untared.kept}: {doubt.text}.")
+    for before, doubt in doubts:
+        context.say(f"{WARNING} {before.kept}: {doubt.text}.")
+
+
+def _zero_doubts(state: SessionState, tared: Payload) -> list[tuple[TrialName, Doubt]]:
+    """Return the doubts about the zero of the trial before this tare."""
+    if state.untared is None or not state.last_bias:
+        return []
+    change = tared.bias[:3] - np.array(state.last_bias[:3])
+    doubts = zero_doubts(float(np.linalg.norm(change)))
+    return [(state.untared, doubt) for doubt in doubts]
+
+
+def _note_zero(context: RunContext, refused: Payload) -> None:
+    """Note on the trial before a refused tare that its zero may have moved.
+
+    The next tare, once the sensor is well again, would not show it.
+    """
+    state = context.journal.state
+    for name, doubt in _zero_doubts(state, refused):
+        if any(note["who"] == _NOTED_BY for note in state.attempt_at(name).notes):
+            continue
+        context.say(f"{WARNING} {name.kept}: {doubt.text}.")
+        where = {"trial": name.number, "attempt": name.attempt}
+        context.append(Event.NOTED, **where, text=doubt.text, who=_NOTED_BY)
 
 
 def _cause_fields(rig: Rig, change: WeightChange) -> dict[str, str]:

@@ -201,6 +201,20 @@ def test_a_zero_that_moved_between_two_tares_is_reported(
     assert (words in capsys.readouterr().out) is is_reported
 
 
+def test_a_refused_tare_doubts_the_zero_of_the_trial_before_it(tmp_path, capsys):
+    """The sensor recovers before the next tare, which would not show it."""
+    context = lifted(tmp_path, residual=1.0)
+    take_tare(context, TrialName(1, 1))
+    keep_first(context)
+    begun = context.loop_client.advanced
+    context.loop_client.force = lambda now: 2.3 if now < begun + 3.0 else 0.1
+    take_tare(context, TrialName(2, 1))
+    words = "the sensor's zero moved by 2.2 N"
+    assert capsys.readouterr().out.count(f"T01: {words}") == 1
+    (note,) = context.journal.state.attempt_at(TrialName(1, 1)).notes
+    assert note["text"].startswith(words)
+
+
 def test_the_zero_of_an_earlier_opening_is_not_compared(tmp_path, capsys):
     context = lifted(tmp_path, residual=50.0)
     take_tare(context, TrialName(1, 1))
