@@ -15,7 +15,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "words",
         nargs="+",
-        metavar="[TRIAL] TEXT",
+        metavar="WORD",
         help="T04 or T04a where one trial is meant, then the remark",
     )
     add_author_option(parser)

@@ -115,7 +115,8 @@ class StudyVariant:
 
     def options(self, before: StudyOptions) -> StudyOptions:
         """Return the options of the repeated study, with only the affected models."""
-        fit = replace(before.fit, models=self.models, draws=0)
+        models = tuple(name for name in self.models if name in before.fit.models)
+        fit = replace(before.fit, models=models, draws=0)
         return self.change(replace(before, fit=fit))
 
 

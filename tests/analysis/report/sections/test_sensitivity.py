@@ -128,6 +128,12 @@ def both(make_series, moving):
     return choice, before, run_study(trials, choice.options(options), simulated=True)
 
 
+def test_models_that_the_study_leaves_out_are_not_fitted():
+    before = StudyOptions(fit=FitOptions(models=("tustin", "gp_se")))
+    repeated = parse_choice("smoothing=25").options(before)
+    assert repeated.fit.models == ("tustin", "gp_se")
+
+
 @pytest.mark.slow
 def test_both_studies_are_shown_side_by_side(both):
     choice, before, after = both
