@@ -205,6 +205,7 @@ def _on_rig(
 ) -> int:
     """Run `work` on one connection; returns its exit code, or that of an abort."""
     from experiments.commissioning.scene import Scene
+    from experiments.messages import rest_text
     from experiments.operator.terminal import keyboard
     from experiments.preflight.connecting import connect_rig
     from experiments.rig.bus_log import logging_bus
@@ -220,20 +221,28 @@ def _on_rig(
     stop = StopFlag()
     rig = connect_rig(settings, row, fake)
     with logging_bus(rig, None, console), handle_signals(stop), keyboard(operator):
-        scene = Scene(rig, ConsoleLoop(rig, console, operator, stop))
+        console_loop = ConsoleLoop(rig, console, operator, stop)
+        scene, was_carrying = Scene(rig, console_loop), False
         try:
             return work(scene)
         except StopRequestedError:
+            was_carrying = console_loop.is_carrying
             console.say(
                 "Stopped as asked. The steps that were done are kept; "
                 "traction commission goes on with the next."
             )
+            console_loop.stop_arm()
+            console_loop.lay_down()
             return INTERRUPTED
         except ArmFaultError as fault:
+            was_carrying = console_loop.is_carrying
             console.problem(scene.fault_words(fault))
             return 4
         finally:
-            scene.console_loop.make_safe()
+            is_confirmed = console_loop.make_safe()
+            if was_carrying:
+                mode = rig.backend.safety_mode()
+                console.say(rest_text(mode, is_confirmed=is_confirmed))
 
 
 def _steps(args: argparse.Namespace) -> list[StepId]:

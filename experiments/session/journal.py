@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from acquisition.clock import Clock
-from acquisition.errors import SessionError
+from acquisition.errors import SessionError, TrialFileError
 from experiments.session.derivation import derive, sidecar_of
 from experiments.session.reducer import SessionState, apply, refusal, replay
 from experiments.session.sidecar import KEEP, checksum_and_size
@@ -43,7 +43,11 @@ class Journal:
             entry |= self._checksum_and_size(entry)
         self.folder.append_event(entry)
         self.state = apply(self.state, entry)
-        derive(self.folder, self.state)
+        try:
+            derive(self.folder, self.state)
+        except TrialFileError as error:
+            error.saved = "The journal has the entry: do not repeat it."
+            raise
 
     def _checksum_and_size(self, entry: dict[str, object]) -> dict[str, object]:
         """Checksum and size of the trial that an event keeps; empty if none."""

@@ -6,6 +6,7 @@ import pytest
 
 from experiments.commands.commission import FAKE_FOLDER
 from experiments.commissioning.evidence.record import NAME, read_commissioning
+from experiments.run.console_loop import ConsoleLoop
 from tests.experiments.program import traction, write_config
 
 FIRST = ("--fake", "--fast", "--operator-script", "auto", "--until", "C1")
@@ -103,3 +104,22 @@ def test_an_unusual_value_gives_a_warning_and_passes(tmp_path, wrong, words):
     assert done.code == 0, done.err
     assert ("▲ C2 identity" in done.out) is bool(wrong)
     assert words in " ".join(done.out.split())
+
+
+@pytest.mark.slow
+def test_a_stop_asks_for_support_of_an_arm_that_the_motors_carry(tmp_path, monkeypatch):
+    tick = ConsoleLoop.tick
+
+    def stopping(loop, *arguments, **named):
+        if loop.is_carrying and not loop.stop.count:
+            loop.stop.request()
+        return tick(loop, *arguments, **named)
+
+    monkeypatch.setattr(ConsoleLoop, "tick", stopping)
+    options = ("--fake", "--fast", "--operator-script", "auto", "--from", "C8")
+    done = traction("commission", *options, "--config", write_config(tmp_path))
+    assert done.code == 130
+    *_, stopped, asked, arm = done.out.splitlines()
+    assert stopped.startswith("Stopped as asked.")
+    assert asked.startswith("Support the arm: it goes idle")
+    assert arm == "ARM: idle; it sinks slowly, support it."
