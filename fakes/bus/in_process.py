@@ -37,6 +37,12 @@ class FakeCanBus(can.BusABC):
         self._t_ns = -1  # time of the last advance
         super().__init__(channel="fake")
 
+    def __del__(self) -> None:
+        """Do nothing: a bus that was never opened by a driver has nothing to release.
+
+        python-can would print a warning among the program's own messages.
+        """
+
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         """Queue a frame for the wire at the clock's time without blocking.
 

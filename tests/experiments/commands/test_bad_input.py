@@ -2,6 +2,8 @@
 
 import json
 import shutil
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from mcap.writer import Writer
 from experiments.session.data_files import journal_line, parse_journal, write_json
 from experiments.session.store import create_session
 from tests.experiments.program import (
+    Done,
     digest,
     only_session,
     run_short,
@@ -50,6 +53,17 @@ def test_an_impossible_run_is_refused(tmp_path, arguments, text):
     assert refusal(done).startswith(text)
     assert done.err.rstrip().endswith("Nothing was started.")
     assert not (tmp_path / "data").exists()
+
+
+def test_a_refused_run_prints_nothing_but_its_refusal(tmp_path):
+    command = ["run", "TF", *FAKE, "--fault", "flood", "--data", str(tmp_path / "data")]
+    done = subprocess.run(
+        [sys.executable, "-m", "experiments", *command],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert refusal(Done(done.returncode, done.stdout, done.stderr))
 
 
 @pytest.mark.parametrize("below", ["", "deeper"])
