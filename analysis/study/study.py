@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from acquisition.errors import SettingsError
+from acquisition.wording import counted
 from analysis.data.events import find_slips
 from analysis.data.plausibility import FEWEST, doubt_summary, doubts_of
 from analysis.data.prepare import (
@@ -389,10 +390,12 @@ def _warnings(result: TerrainResult, has_container: bool) -> list[str]:
         )
     dropped = sum(t.dropped_rows for t in result.trials if not t.is_foreign)
     if dropped:
-        warnings.append(f"{result.terrain}: {dropped} rows were not finite; dropped.")
+        rows = counted(dropped, "row")
+        warnings.append(f"{result.terrain}: {rows} dropped: not finite.")
     repeated = sum(trial.repeated_rows for trial in result.trials)
     if repeated:
-        warnings.append(f"{result.terrain}: {repeated} duplicate rows were dropped.")
+        rows = counted(repeated, "duplicate row")
+        warnings.append(f"{result.terrain}: {rows} dropped.")
     warnings += _ploughing(result)
     constant = [name for name in ("F_n", "v_t") if _is_constant(result.trials, name)]
     if constant:

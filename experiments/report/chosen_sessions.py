@@ -20,8 +20,10 @@ def choose_sessions(
         SessionError: none are named or found, or live and simulated ones are mixed.
     """
     if bool(names) == every:
-        hint = "For example: traction report S012"
-        raise SessionError("Name the sessions to report, or use --all.", hint=hint)
+        raise SessionError(
+            "Name sessions, e.g. S012, or all of them (report, publish): --all.",
+            hint="Nothing was read.",
+        )
     if every:
         sessions = [s for s in list_sessions(data) if _counts(s)]
     else:

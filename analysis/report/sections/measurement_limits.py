@@ -66,7 +66,7 @@ def limits_table(results: StudyResults) -> ReportTable:
             "sensor floor [N]",
             "tare drift [N]",
             "uncertainty of mean F_t, F_n [N]",
-            "best model's error [N]",
+            "smallest error of any model [N]",
             "error over floor",
             "F_n above set load [N]",
             "joint drag [N]",

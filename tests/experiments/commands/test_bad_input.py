@@ -284,7 +284,7 @@ def update_checksums(path):
 
 
 def test_a_report_without_sessions_or_trials_is_refused(tmp_path):
-    assert "Name the sessions to report, or use --all." in refusal(
+    assert "Name sessions, e.g. S012, or all of them" in refusal(
         traction("report", "--data", tmp_path)
     )
     assert "There are no kept trials in" in refusal(

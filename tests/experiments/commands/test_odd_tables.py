@@ -81,7 +81,7 @@ def deficient(tmp_path_factory):
         "100% sticking",
         "stuck: 0 trial with kept samples",
         "holes/01: 30 rows without a value dropped",
-        "twice: 1400 duplicate rows were dropped",
+        "twice: 1400 duplicate rows dropped",
         "short, fold 1, Tustin: 2 samples are too few",
         "short, fold 1, GP (SE): No Gaussian process from 2 samples",
         "health and limits are unknown",
@@ -116,7 +116,7 @@ def test_a_terrain_that_cannot_be_fitted_has_no_error_value(deficient, terrain):
 
 def test_warnings_are_printed_by_the_command_too(deficient):
     out, _, _ = deficient
-    assert "▲ twice: 1400 duplicate rows were dropped." in out
+    assert "▲ twice: 1400 duplicate rows dropped." in out
 
 
 @pytest.mark.long
