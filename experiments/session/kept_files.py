@@ -175,7 +175,7 @@ def _unknown_to_journal(
     if origin := stated_id(folder):
         faults.append((SUMMARY_FILE, f"is of {origin}: a copy, or a renamed session"))
     lines, stated = text.count(b"\n"), summary.get("events")
-    if lines > 1 and not summary:
+    if lines > 1 and not (summary and isinstance(summary.get("kept", []), list)):
         faults.append((SUMMARY_FILE, "is missing or damaged"))
     lost = [name for name in summarised if name not in judged]
     if not text and (summarised or stated):
@@ -197,19 +197,26 @@ def name_contradiction(
     The name decides for which terrain a session counts, and whether as simulated; both
     files state the same.
     """
-    stated = read_json(folder.path / SUMMARY_FILE).get("simulated")
+    summary = read_json(folder.path / SUMMARY_FILE)
+    stated = summary.get("simulated")
     if isinstance(stated, bool) and stated is not folder.is_simulated:
         return _wrong_kind(folder, SUMMARY_FILE, is_simulated=stated)
-    if not events or events[0].get("event") != Event.STARTED:
+    is_started = bool(events) and events[0].get("event") == Event.STARTED
+    first: _Facts = events[0] if is_started else {}
+    for file, stated_by in ((JOURNAL_FILE, first), (SUMMARY_FILE, summary)):
+        terrain = stated_by.get("terrain", folder.terrain)
+        if terrain != folder.terrain:
+            return _wrong_terrain(folder, file, terrain)
+    if not is_started:
         return None
-    first = events[0]
-    terrain = first.get("terrain", folder.terrain)
-    if terrain != folder.terrain:
-        return Deviation(folder.id, JOURNAL_FILE, f"is of {terrain}: a renamed session")
     is_simulated = first.get("fake", folder.is_simulated or None) is not None
     if is_simulated is not folder.is_simulated:
         return _wrong_kind(folder, JOURNAL_FILE, is_simulated=is_simulated)
     return None
+
+
+def _wrong_terrain(folder: SessionFolder, file: str, terrain: object) -> Deviation:
+    return Deviation(folder.id, file, f"is of {terrain}: a renamed session")
 
 
 def _wrong_kind(folder: SessionFolder, file: str, *, is_simulated: bool) -> Deviation:

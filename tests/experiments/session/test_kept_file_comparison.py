@@ -156,6 +156,14 @@ DAMAGES = {
         set_json("session.json", kept=["T01", "T02", "T04"]),
         {("trials/T04.mcap", "is kept in session.json, not in the journal")},
     ),
+    "summary without a list": (
+        set_json("session.json", kept=7),
+        {("session.json", "is missing or damaged")},
+    ),
+    "summary of another terrain": (
+        set_json("session.json", terrain="B0"),
+        {("session.json", "is of B0: a renamed session")},
+    ),
     "sidecar gone": (
         drop("trials/T01.json"),
         {("trials/T01.json", "is missing or unreadable")},
