@@ -15,7 +15,7 @@ from wam.bus.log import CanLog
 if TYPE_CHECKING:
     from experiments.rig.rig import Rig
 
-_BUFFER = 1 << 20  # bytes, so that a write to the disk is rare
+_BUFFER = 1 << 16  # bytes: a killed program loses less than a second of the log
 
 
 @contextmanager
