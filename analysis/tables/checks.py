@@ -23,6 +23,7 @@ _STEPS = 10.0  # smallest gap as a multiple of the median step
 _SLOWEST, _FASTEST = 0.2, 2e-5  # s between rows if the unit of t is not stated
 _WORDS = {"d": "days"}
 _USUAL = (5e-5, 0.2)  # s, plausible range between rows
+_IMPOSSIBLE = 1e9  # m/s or N
 _WILD = 20.0  # multiple of the 99.9 % quantile beyond which a value is an outlier
 _FLOORS = (0.05, 1.0, 1.0)  # m/s, N, N; lower limits of that quantile
 # Column, unit suggested by values above the limit, and the limit [m/s, N].
@@ -98,6 +99,23 @@ def check_order(path: Path, table: TrialTable, rows: Array) -> None:
         f"{path}, {where}, column t: time does not increase ({before:.9g} s, then "
         f"{now:.9g} s).",
         hint=hint,
+    )
+
+
+def check_size(path: Path, table: TrialTable, rows: Array) -> None:
+    """Refuse values that no foot has and whose squares overflow.
+
+    Raises:
+        SettingsError: a finite value is beyond `_IMPOSSIBLE`.
+    """
+    beyond = np.isfinite(rows[:, 1:]) & (np.abs(rows[:, 1:]) > _IMPOSSIBLE)
+    if not beyond.any():
+        return
+    row, k = np.argwhere(beyond)[0]
+    raise SettingsError(
+        f"{path}, {table.location(int(row))}, column {COLUMNS[k + 1]}: "
+        f"{rows[row, k + 1]:.6g} is no measurement.",
+        hint="A code for a missing value? Leave such cells empty.",
     )
 
 

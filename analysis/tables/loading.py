@@ -23,7 +23,7 @@ from acquisition.files import UnfitFileError, open_regular
 from acquisition.wording import counted
 from analysis.data.memory import share_of_memory
 from analysis.data.series import Array, TractionSeries
-from analysis.tables.checks import check_clock, check_order, notes_of
+from analysis.tables.checks import check_clock, check_order, check_size, notes_of
 from analysis.tables.columns import COLUMNS, GROUPS, factor
 from analysis.tables.data_package import (
     PackagedTable,
@@ -226,6 +226,7 @@ class _TableForm:
         if not origin.session:
             check_order(path, table, rows)
             check_clock(path, rows, is_timed)
+            check_size(path, table, rows)
             notes = list(notes_of(path, table, rows))
         if further := list(table.further.values()):
             _check_inputs(path, table.further)

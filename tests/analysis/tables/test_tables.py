@@ -327,3 +327,16 @@ def test_an_invalid_rate_is_refused(tmp_path, rate):
 def test_any_positive_rate_is_accepted(tmp_path, rate):
     path = write(tmp_path, "v_t,F_n,F_t\n" + "0.1,2,1\n" * 5)
     assert load_tables([path], rate=rate)["table"][0].t[1] == 0.005
+
+
+@pytest.mark.parametrize("column", ["v_t", "F_n", "F_t"])
+@pytest.mark.parametrize("value", ["1e300", "-3.4e38", "2e9"])
+def test_a_value_that_no_foot_has_is_refused_with_its_line(tmp_path, column, value):
+    lines = [GOOD.splitlines()[0]]
+    lines += [f"{0.1 * k:.1f},0.1,2,1" for k in range(30)]
+    cells = lines[20].split(",")
+    cells[["t", "v_t", "F_n", "F_t"].index(column)] = value
+    lines[20] = ",".join(cells)
+    path = write(tmp_path, "\n".join(lines) + "\n")
+    with pytest.raises(SettingsError, match=f"line 21, column {column}: .* no measur"):
+        load_tables([path])
