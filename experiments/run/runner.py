@@ -58,9 +58,10 @@ class SessionRunner:
             reason = "complete" if context.journal.state.is_complete else "unfinished"
         except StopRequestedError:
             code, reason = CATALOGUE["interrupted"].exit_code, "unfinished"
-            context.say(
-                CATALOGUE["interrupted"].text({}, context.journal.saved_message())
-            )
+            message = CATALOGUE["interrupted"]
+            if not context.console_loop.is_carrying:  # not yet, or not any more
+                message = replace(message, arm="")
+            context.say(message.text({}, context.journal.saved_message()))
         except ArmFaultError as fault:
             code, reason = _FAULT_CODE, fault.verdict.reason
             context.state.fault_context = replace(

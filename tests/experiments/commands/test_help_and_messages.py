@@ -611,7 +611,7 @@ CASES = {
     "mixed": refused(_mixed),
     "nobody": refused(lambda scene: traction("run", "TF", "--data", scene.data)),
     "foot-changed": Case(_other_foot, 2, words="S002 was recorded with the foot bare"),
-    "interrupted": Case(lambda s: resume(s, press=give_up(Prompt.SUPPORT)), 5),
+    "interrupted": Case(lambda s: resume(s, press=give_up(Prompt.LIFT)), 5),
     "nothing-lost": refused(lambda s: _failing_status(s, KeyboardInterrupt()), 130),
 }
 
