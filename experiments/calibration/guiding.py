@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Callable, Collection
 from pathlib import Path
 
-from acquisition.control_loop.faults import Action
+from acquisition.control_loop.faults import Action, GuardVerdict
 from acquisition.errors import SettingsError, TractionError
 from experiments.calibration.options import fake_options
 from experiments.messages import FaultContext, fault_text, rest_text
@@ -105,24 +105,35 @@ def _guided(console_loop: ConsoleLoop, work: Callable[[], None], command: str) -
         if was_moving and fault.verdict.action is Action.DAMP:
             # Nobody holds the arm: the excessive speed may be an encoder fault.
             console_loop.make_safe()
-        loop_client = console_loop.loop_client
-        loop_client.advance(TICK)
-        context = FaultContext(
-            "The calibration",
-            bus=loop_client.loop.bus_condition,
-            prompt=None,
-            command=command,
-            state=loop_client.status.state,
-        )
+        console_loop.loop_client.advance(TICK)
         result = f"{_STOPPED} {_NOTHING}" if was_moving else _NOTHING
-        console.problem(fault_text(fault.verdict, context, result))
+        console.problem(_fault_text(console_loop, fault.verdict, command, result))
         return 4
     except TractionError as error:
         console.problem(f"{error} {_NOTHING}")
-        return error.exit_code
+        verdict = console_loop.standing_verdict()
+        if verdict is None:
+            return error.exit_code
+        console.problem(_fault_text(console_loop, verdict, command, ""))
+        return 4
     finally:
         console_loop.lay_down()
         is_confirmed = console_loop.make_safe()
         mode = console_loop.rig.backend.safety_mode()
         console.say(rest_text(mode, is_confirmed=is_confirmed))
     return 0
+
+
+def _fault_text(
+    console_loop: ConsoleLoop, verdict: GuardVerdict, command: str, result: str
+) -> str:
+    """Return the message of a fault; `command` starts the calibration again."""
+    loop_client = console_loop.loop_client
+    context = FaultContext(
+        "The calibration",
+        bus=loop_client.loop.bus_condition,
+        prompt=None,
+        command=command,
+        state=loop_client.status.state,
+    )
+    return fault_text(verdict, context, result)
