@@ -31,7 +31,7 @@ _COMMENT = re.compile(r"\s{2,}#.*")
 # Environment variables passed on: path, language and the source of packages.
 _PASSED_ON = re.compile("PATH$|LANG$|PIP_|SSL_|HTTPS?_PROXY")
 _PIP = Path("~/.config/pip/pip.conf").expanduser()
-_KEYS = (("[k]", "k"), ("[space]", " "))  # prompt on the screen, key to press
+_KEYS = (("[k]", "k"), ("[i]dle", "i"), ("[space]", " "))  # prompt on screen, key
 _KEY_INTERVAL = 1.0  # s
 _TAIL = 2000  # characters of output that are searched
 _LIMIT_S = 1800.0
