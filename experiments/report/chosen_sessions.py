@@ -41,7 +41,7 @@ def choose_sessions(
 
 def _counts(session: SessionFolder) -> bool:
     """Whether a session has kept trials, or had some before its journal was damaged."""
-    return bool(journal_deviations(session) or replay(session.events()).kept)
+    return bool(replay(session.events()).kept or journal_deviations(session))
 
 
 def report_missing(

@@ -143,8 +143,7 @@ class SessionRunner:
         context = self._context
         verdict = context.console_loop.standing_verdict()
         if verdict is None:
-            if not error.arm_state:
-                error.arm_state = self._arm_state()
+            error.arm_state = self._arm_state(error.arm_state)
             context.report_error(error)
             return error.exit_code
         error.arm_state = ""
@@ -153,12 +152,16 @@ class SessionRunner:
         context.report_fault(verdict)
         return _FAULT_CODE if verdict.ends_session else error.exit_code
 
-    def _arm_state(self) -> str:
-        """Return what the arm does at an error that is not of the arm; "" if idle."""
+    def _arm_state(self, stated: str) -> str:
+        """Return what the arm does at an error that is not of the arm.
+
+        Args:
+            stated: what the error says; it does not know whether the loop still runs.
+        """
         context = self._context
         if not context.rig.backend.is_controlled:
             return _UNCONTROLLED
-        return _HOLDING if context.console_loop.is_carrying else ""
+        return stated or (_HOLDING if context.console_loop.is_carrying else "")
 
     def _make_safe(self) -> str:
         """Idle the arm; returns its state as text; safe to repeat."""

@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+from experiments.rig.backend import InProcessBackend
 from tests.experiments.program import run_short
 from tests.sweeps import swept
 
@@ -56,3 +57,14 @@ def test_an_arm_that_holds_after_a_lost_trial_waits_for_its_person(
     assert done.code == 6
     assert states(done.err) == ["holding"]
     assert "Support the arm: it goes idle and sinks slowly. [i]dle" in done.out
+
+
+def test_a_lost_trial_does_not_claim_control_that_was_lost_too(
+    config, tmp_path, monkeypatch
+):
+    lost = property(lambda backend: False)
+    monkeypatch.setattr(InProcessBackend, "is_controlled", lost)
+    done = run(config, tmp_path, "write-failed@T1+0s")
+    assert done.code == 6
+    assert states(done.err) == ["not under control"]
+    assert "[i]dle" not in done.out
